@@ -177,7 +177,7 @@
    Limits       Order 6; 2^24 samples; 2^31 - 1 texels along an axis (more: ISOGI_TOO_LARGE); paths end after 10000 reflections.
                 White surfaces that enclose a light truly have infinite light: what is computed then is finite and has no meaning;
                 its error says so, and isogi_trace_report.diverges. Under matter (HIGH_SIDE) of albedo above .9 narrow places may err by
-                several times the error that is told; so may, with desc.reach, what is reflected in capped matter a few voxels thick.
+                several times the error that is told; so may, with desc.reach, what is reflected in capped matter a voxel thick.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
                 thinner than the lattice's spacing a lookup mixes the light of both of its sides.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts as
@@ -278,8 +278,8 @@ typedef struct isogi_trace_desc {
     void *material_user;
     isogi_trace_sides sides;
     int no_shadows;            /* non-zero: lights and the environment reach every surface that faces them; reflections stay as they are */
-    float reach;               /* surfaces further than this (world units) from where a ray starts do not exist for it: with 0 bounces
-                                  ambient occlusion of that radius; 0 = unlimited */
+    float reach;               /* surfaces further than this (world units) from the place that a ray leaves do not exist for it: with
+                                  0 bounces ambient occlusion of that radius; 0 = unlimited */
     int bounces;               /* 0 = light that arrives directly; n = up to n reflections; -1 = all (Russian roulette) */
     isogi_trace_method method; /* isogi_trace_gather: always PATHS */
     int samples;               /* directions per texel; 0 = 64 */
@@ -1233,6 +1233,21 @@ static void isogi_trace__beam_from(isogi_trace__beam *beam, const double point[3
     for (a = 0; a < 3 && length > 0; a++) beam->dir[a] = (float)(to[a] / length);
 }
 
+/* tmax within the scene's reach; 0 is unlimited in both. Reach is measured from the place on the surface, also where the ray begins off
+   it: else what is seen across a narrow gap would depend on the offset. */
+static double isogi_trace__within(const isogi_trace_desc *d, const double place[3], const double origin[3], const float dir[3],
+                                  double tmax) {
+    const double reach = (double)d->reach;
+    double off[3], along = 0, apart = 0, within;
+    int a;
+    if (!(reach > 0)) return tmax;
+    for (a = 0; a < 3; a++) off[a] = origin[a] - place[a], along += off[a] * (double)dir[a], apart += off[a] * off[a];
+    within = along * along + reach * reach - apart;
+    within = within > 0 ? sqrt(within) - along : 0;
+    if (!(within > 0)) within = DBL_MIN; /* 0 would be unlimited */
+    return !(tmax > 0) || tmax > within ? within : tmax;
+}
+
 /* ==== voxels and texels ============================================================================================== */
 
 /* A colour from outside: within [0, most], NaN is 0. */
@@ -1378,7 +1393,6 @@ typedef struct isogi_trace__scene {
     int wide;    /* some light looks wide: its half-shadows are everywhere */
     double least; /* shortest edge of a voxel */
     isogi_trace__cells cells[9];
-    double reach[ISOGI_TRACE__WAVE]; /* of rays, or all zero */
 } isogi_trace__scene;
 
 /* Where the light is gathered. */
@@ -1566,6 +1580,7 @@ typedef struct isogi_trace__wave {
     double density[ISOGI_TRACE__WAVE];   /* with which dir was drawn, times pi */
     signed char from[ISOGI_TRACE__WAVE]; /* side on which the ray travels: 1 low, -1 high, 0 not known */
     float dir[ISOGI_TRACE__WAVE][3];
+    double tmax[ISOGI_TRACE__WAVE];
     isogi_hit start[ISOGI_TRACE__WAVE];
     float shading[ISOGI_TRACE__WAVE][3], geometric[ISOGI_TRACE__WAVE][3];
     isogi_hit hit[ISOGI_TRACE__WAVE];
@@ -1648,17 +1663,15 @@ static double isogi_trace__cosine_at(const isogi_trace__wave *w, int i, int dept
                  : isogi_trace__site_kernel(w->site, dir);
 }
 
-/* tmax within the scene's reach; 0 is unlimited in both. */
-static double isogi_trace__within(const isogi_trace__scene *scene, double tmax) {
-    double reach = scene->reach[0];
-    return reach > 0 && (!(tmax > 0) || tmax > reach) ? reach : tmax;
+static double isogi_trace__wave_within(const isogi_trace__wave *w, int depth, const float dir[3], double tmax) {
+    return isogi_trace__within(&w->scene->desc, w->site->point, depth ? w->site->point : w->site->origin, dir, tmax);
 }
 
-static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows *s, int i, const float dir[3], double tmax,
-                                     const double rgb[3]) {
+static void isogi_trace__shadows_add(isogi_trace__wave *w, isogi_trace__shadows *s, int i, int depth, const float dir[3],
+                                     double tmax, const double rgb[3]) {
     int c;
     memcpy(s->dir[s->count], dir, sizeof s->dir[0]);
-    s->path[s->count] = i, s->tmax[s->count] = isogi_trace__within(w->scene, tmax);
+    s->path[s->count] = i, s->tmax[s->count] = isogi_trace__wave_within(w, depth, dir, tmax);
     for (c = 0; c < 3; c++) s->rgb[s->count][c] = w->through[i][c] * rgb[c];
     s->count++;
 }
@@ -1686,7 +1699,7 @@ static void isogi_trace__wave_lights(isogi_trace__wave *w, isogi_trace__shadows 
             if (!(cosine > 0)) continue;
             for (c = 0; c < 3; c++) beam.rgb[c] *= cosine / ISOGI_TRACE__PI;
             if (!depth && !w->site->on_surface) isogi_trace__beam_from(&beam, w->site->point, w->site->origin);
-            isogi_trace__shadows_add(w, s, i, beam.dir, beam.tmax, beam.rgb);
+            isogi_trace__shadows_add(w, s, i, depth, beam.dir, beam.tmax, beam.rgb);
         }
         isogi_trace__shadows_flush(w, s, depth);
     }
@@ -1707,7 +1720,7 @@ static void isogi_trace__wave_sky(isogi_trace__wave *w, isogi_trace__shadows *s,
         if (!(cosine > 0) || !(density > 0)) continue;
         isogi_trace__env_light(sky->env, dir, radiance);
         for (c = 0; c < 3; c++) rgb[c] = (double)radiance[c] * cosine / (density + cosine);
-        isogi_trace__shadows_add(w, s, i, dir, 0, rgb);
+        isogi_trace__shadows_add(w, s, i, depth, dir, 0, rgb);
     }
     isogi_trace__shadows_flush(w, s, depth);
 }
@@ -1845,11 +1858,12 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
         }
         if (lit) isogi_trace__wave_lights(w, &w->shadows, depth, positions);
         if (lit) isogi_trace__wave_sky(w, &w->shadows, depth);
+        for (i = 0; i < w->count; i++) w->tmax[i] = isogi_trace__wave_within(w, depth, (const float *)w->dir[i], 0);
         if (!depth)
-            isogi_trace__site_rays(scene, w->site, scene->high ? -1 : 1, (const float(*)[3])w->dir, scene->reach, (size_t)w->count, w->ray,
+            isogi_trace__site_rays(scene, w->site, scene->high ? -1 : 1, (const float(*)[3])w->dir, w->tmax, (size_t)w->count, w->ray,
                                    w->hit, w->counters);
         else
-            isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, scene->reach, w->site->isovalue, scene->flags,
+            isogi_vol_continue(scene->pyramid, w->start, (const float(*)[3])w->dir, w->tmax, w->site->isovalue, scene->flags,
                                (size_t)w->count, w->hit, w->counters);
         for (i = 0; i < w->count; i++) {
             if (depth) isogi_trace__hold(scene, &w->start[i], (const float *)w->dir[i], w->site->isovalue, w->from[i], &w->hit[i]);
@@ -1874,7 +1888,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         isogi_hit hit;
         if (!isogi_trace__is_delta(&lighting->lights[l])) continue;
         if (!isogi_trace__light_beam(&lighting->lights[l], site->point, 0, 0, &beam) || !isogi_trace__site_beam(site, &beam)) continue;
-        beam.tmax = isogi_trace__within(scene, beam.tmax), hit.side = 0;
+        beam.tmax = isogi_trace__within(&scene->desc, site->point, site->origin, beam.dir, beam.tmax), hit.side = 0;
         if (!scene->desc.no_shadows)
             isogi_trace__site_rays(scene, site, scene->high ? -1 : 1, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c];
@@ -2168,11 +2182,9 @@ static isogi_result isogi_trace__scene_set(isogi_trace__scene *scene, const isog
     isogi_trace_desc *d = &scene->desc;
     isogi_result result;
     double range[2];
-    int i;
     memset(scene, 0, sizeof *scene);
     *d = *desc;
     scene->high = d->sides == ISOGI_TRACE_HIGH_SIDE;
-    for (i = 0; i < ISOGI_TRACE__WAVE; i++) scene->reach[i] = (double)d->reach;
     scene->pyramid = d->pyramid;
     scene->volume = isogi_vol_volume(d->pyramid);
     isogi_vol_range(d->pyramid, range);
@@ -4538,7 +4550,7 @@ static void isogi_trace__cast_add(isogi_trace__cast *c, const float dir[3], doub
     int i = c->count;
     isogi_ray *ray = &c->ray[i];
     memcpy(ray->dir, dir, sizeof ray->dir);
-    tmax = isogi_trace__within(scene, tmax);
+    tmax = isogi_trace__within(&scene->desc, site->point, site->origin, dir, tmax);
     if (site->on_surface) {
         if (c->shadow && scene->desc.no_shadows) memset(&c->hit[i], 0, sizeof c->hit[i]);
         else isogi_trace__site_rays(scene, site, site->from, (const float(*)[3])dir, &tmax, 1, ray, &c->hit[i], c->counters);
@@ -7607,7 +7619,7 @@ static void isogi_trace__field_ray(isogi_trace__walk *w, int at, int path, const
     memset(&w->ray[at], 0, sizeof w->ray[at]);
     memcpy(w->ray[at].origin, w->place[path], sizeof w->ray[at].origin);
     memcpy(w->ray[at].dir, dir, sizeof w->ray[at].dir);
-    w->ray[at].tmax = isogi_trace__within(&w->field->scene, tmax), w->owner[at] = path;
+    w->ray[at].tmax = isogi_trace__within(&w->field->scene.desc, w->point[path], w->place[path], dir, tmax), w->owner[at] = path;
 }
 
 /* Shadow rays that were gathered: what arrives where nothing is in the way. */
@@ -7756,7 +7768,6 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
     isogi_trace__field f;
     isogi_lighting sky;
     isogi_result result;
-    int i;
     if (!desc || !intersect || (count && (!points || !normals || !irradiance)) || !isogi_trace__fields_valid(desc)) return ISOGI_INVALID;
     if (desc->mode != ISOGI_TRACE_IRRADIANCE || desc->offset < 0) return ISOGI_INVALID;
     if (!count) return ISOGI_OK;
@@ -7764,7 +7775,6 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
     f.intersect = intersect, f.user = user, f.points = points, f.normals = normals, f.count = count;
     f.scene.desc = *desc, f.scene.has_env = desc->lighting.env.rgb || desc->lighting.env.sh;
     if (!desc->samples) f.scene.desc.samples = 64;
-    for (i = 0; i < ISOGI_TRACE__WAVE; i++) f.scene.reach[i] = (double)desc->reach;
     f.irradiance = (float(*)[3])isogi_allocate(context, count, sizeof *f.irradiance);
     f.error = (float *)isogi_allocate(context, count, sizeof *f.error);
     sky = f.scene.desc.lighting, sky.lights = NULL, sky.light_count = 0;

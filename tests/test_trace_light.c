@@ -633,7 +633,7 @@ TEST(without_shadows_a_closed_ball_is_lit_from_outside) {
 }
 
 /* Ambient occlusion of radius d below an infinite ceiling at height h: only rays within acos(h/d) of the normal are blocked: E = pi
-   (h/d)^2; below the height nothing is. The ray starts on the surface. */
+   (h/d)^2; below the height nothing is. The radius is that around the place on the surface, wherever rays start. */
 static double slot(const double p[3], const double *q) { return fmax(q[0] - p[1], p[1] - q[1]); }
 TEST(occlusion_has_a_radius) {
     double q[2] = {4, 8};
@@ -647,10 +647,13 @@ TEST(occlusion_has_a_radius) {
         d.reach = (float)reach[i];
         isogi_trace_gather(&d, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
         CHECK(fabs((double)e[0][0] - expected) < 0.01 * PI, "radius %g: E %.4f, expected %.4f", reach[i], (double)e[0][0], expected);
-        for (int off = 0; off < 2; off++) { /* by the default method, from the surface, and a quarter of a voxel above it */
+        for (int off = 0; off < 2; off++) { /* by each method, from the surface, and from a quarter of a voxel above it */
             isogi_trace_desc t = d;
-            double height = off ? 3.75 : 4;
-            t.offset = off ? 0.25f : -1, expected = reach[i] > height ? PI * height * height / (reach[i] * reach[i]) : PI;
+            double height = off ? 3.75 : 4, past = reach[i] * reach[i] - 16; /* of the ceiling's part within reach, radius squared */
+            t.offset = off ? 0.25f : -1, expected = past > 0 ? PI * height * height / (height * height + past) : PI;
+            isogi_trace_gather(&t, (const float(*)[3])p, NULL, 1, e, NULL, NULL);
+            CHECK(fabs((double)e[0][0] - expected) < 0.01 * PI, "radius %g, off %d: E %.4f, expected %.4f", reach[i], off, (double)e[0][0],
+                  expected);
             CHECK(fabs(lit_texel(&t, p[0], 0) - expected) < 0.01 * PI, "radius %g, by the default method: E %.4f, expected %.4f", reach[i],
                   lit_texel(&t, p[0], 0), expected);
         }
