@@ -223,8 +223,8 @@
    where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in
    common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force,
    too. Errors:
-   ISOGI_INVALID for anything outside of its documented range, ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY,
-   ISOGI_CANCELLED.
+   ISOGI_INVALID for anything outside of its documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which),
+   ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
@@ -266,6 +266,8 @@ typedef struct isogi_transfer {
 
 /* Order, finiteness, ranges as stated above. */
 ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer);
+/* What is wrong with it: the member at fault and why, for whoever writes the program; NULL where it is valid. */
+ISOGI_API const char *isogi_transfer_fault(const isogi_transfer *transfer);
 
 /* rgb and extinction at a data value, for a transfer function that is valid (peaks are not part of it). All zero for a NaN. */
 ISOGI_API void isogi_transfer_at(const isogi_transfer *transfer, double value, float rgb[3], float *extinction);
@@ -419,6 +421,11 @@ ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double
    description outside its documented ranges. *dvr is written on success alone. The paper's method, for which voxels are read, calls the
    progress callback, with a fraction of 0 throughout: ISOGI_CANCELLED where it asks for that. */
 ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context);
+/* Why isogi_dvr_create refuses a description, and pictures a view: the member at fault and why, as "order: not 0 .. 6", for whoever writes
+   the program; NULL where none is, but what is too large by several together, as grids, is told by the result alone, and so is `local`
+   without the paper's method. */
+ISOGI_API const char *isogi_dvr_fault(const isogi_dvr_desc *desc);
+ISOGI_API const char *isogi_view_fault(const isogi_view *view);
 ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 
 /* Copied. Visibility has to be stepped again, from the beginning, before it is right for the new function; until a grid point's
@@ -748,33 +755,45 @@ static void isogi_dvr__transform(const double m[9], const double v[3], double ou
 
 /* ==== transfer functions ============================================================================================= */
 
-static int isogi_dvr__points_valid(const isogi_transfer_point *points, size_t count) {
-    size_t i;
+/* Finite, within 0 .. 1e30. */
+static int isogi_dvr__colour_ok(const float rgb[3]) {
     int a;
-    if (count && !points) return 0;
-    for (i = 0; i < count; i++) {
-        const isogi_transfer_point *p = &points[i];
-        if (!isogi_dvr__finite64(p->value) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->extinction)) return 0;
-        if (!(p->extinction >= 0) || (i && !(p->value >= p[-1].value))) return 0;
-        for (a = 0; a < 3; a++)
-            if (!(p->rgb[a] >= 0 && p->rgb[a] <= 1e30f)) return 0;
-    }
+    if (!isogi_dvr__finite3(rgb)) return 0;
+    for (a = 0; a < 3; a++)
+        if (!(rgb[a] >= 0 && rgb[a] <= 1e30f)) return 0;
     return 1;
 }
 
-ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer) {
+static const char *isogi_dvr__points_fault(const isogi_transfer_point *points, size_t count) {
     size_t i;
-    int a;
-    if (!transfer || (transfer->peak_count && !transfer->peaks)) return ISOGI_INVALID;
-    if (!isogi_dvr__points_valid(transfer->points, transfer->point_count)) return ISOGI_INVALID;
-    for (i = 0; i < transfer->peak_count; i++) {
-        const isogi_peak *p = &transfer->peaks[i];
-        if (!isogi_dvr__finite64(p->isovalue) || !isogi_dvr__finite3(p->rgb) || !isogi_dvr__finite32(p->opacity)) return ISOGI_INVALID;
-        if (!(p->opacity >= 0 && p->opacity <= 1)) return ISOGI_INVALID;
-        for (a = 0; a < 3; a++)
-            if (!(p->rgb[a] >= 0 && p->rgb[a] <= 1e30f)) return ISOGI_INVALID;
+    if (count && !points) return "points: NULL, but their count is not 0";
+    for (i = 0; i < count; i++) {
+        const isogi_transfer_point *p = &points[i];
+        if (!isogi_dvr__finite64(p->value)) return "points: a value is not finite";
+        if (!isogi_dvr__finite32(p->extinction) || !(p->extinction >= 0)) return "points: an extinction is negative or not finite";
+        if (!isogi_dvr__colour_ok(p->rgb)) return "points: an rgb is not 0 .. 1e30";
+        if (i && !(p->value >= p[-1].value)) return "points: a value is below the one before it";
     }
-    return ISOGI_OK;
+    return NULL;
+}
+
+ISOGI_API const char *isogi_transfer_fault(const isogi_transfer *transfer) {
+    const char *fault;
+    size_t i;
+    if (!transfer) return "transfer: NULL";
+    if (transfer->peak_count && !transfer->peaks) return "peaks: NULL, but peak_count is not 0";
+    fault = isogi_dvr__points_fault(transfer->points, transfer->point_count);
+    for (i = 0; i < transfer->peak_count && !fault; i++) {
+        const isogi_peak *p = &transfer->peaks[i];
+        if (!isogi_dvr__finite64(p->isovalue)) fault = "peaks: an isovalue is not finite";
+        else if (!isogi_dvr__finite32(p->opacity) || !(p->opacity >= 0 && p->opacity <= 1)) fault = "peaks: an opacity is not 0 .. 1";
+        else if (!isogi_dvr__colour_ok(p->rgb)) fault = "peaks: an rgb is not 0 .. 1e30";
+    }
+    return fault;
+}
+
+ISOGI_API isogi_result isogi_transfer_validate(const isogi_transfer *transfer) {
+    return isogi_transfer_fault(transfer) ? ISOGI_INVALID : ISOGI_OK;
 }
 
 /* How many points have a value <= x. */
@@ -2726,59 +2745,76 @@ static void isogi_dvr__set_lattice(isogi_dvr *d) {
     }
 }
 
-static int isogi_dvr__resolve_material(isogi_material *m, int transmission) {
+static int isogi_dvr__material_ok(const isogi_material *m) {
     int a;
     if (!isogi_dvr__finite3(m->diffuse) || !isogi_dvr__finite3(m->specular) || !isogi_dvr__finite32(m->exponent)) return 0;
     for (a = 0; a < 3; a++)
         if (!(m->diffuse[a] >= 0 && m->specular[a] >= 0)) return 0;
-    if (!(m->exponent >= 0 && m->exponent <= 1e6f)) return 0;
+    return m->exponent >= 0 && m->exponent <= 1e6f;
+}
+
+static void isogi_dvr__resolve_material(isogi_material *m, int transmission) {
     if (!(m->diffuse[0] > 0 || m->diffuse[1] > 0 || m->diffuse[2] > 0)) m->diffuse[0] = m->diffuse[1] = m->diffuse[2] = 1;
-    if (!transmission || m->specular[0] > 0 || m->specular[1] > 0 || m->specular[2] > 0) return 1;
+    if (!transmission || m->specular[0] > 0 || m->specular[1] > 0 || m->specular[2] > 0) return;
     m->specular[0] = m->specular[1] = m->specular[2] = 1;
-    return 1;
+}
+
+static int isogi_dvr__within(double x, double low, double high) { return isogi_dvr__finite64(x) && x >= low && x <= high; }
+
+static const char *isogi_dvr__visibility_fault(const isogi_dvr_desc *d) {
+    if ((int)d->method < 0 || d->method > ISOGI_DVR_SWEEP) return "method: none of isogi_dvr_method";
+    if ((int)d->sphere < 0 || d->sphere > ISOGI_DVR_ICOSAHEDRON) return "sphere: none of isogi_dvr_sphere";
+    if (d->order < 0 || d->order > ISOGI_DVR__MAX_ORDER) return "order: not 0 .. 6";
+    if (d->directions < 0 || d->directions > 65536) return "directions: not 0 .. 65536";
+    if (d->coarsest < 0 || d->coarsest > 8 || (d->coarsest & (d->coarsest - 1))) return "coarsest: not 0, 1, 2, 4 or 8";
+    if (!isogi_dvr__within(d->visibility_step, 0, 2e4) || (d->visibility_step > 0 && d->visibility_step < 1e-4))
+        return "visibility_step: neither 0 nor 1e-4 .. 2e4";
+    if (!isogi_dvr__within(d->tolerance, 0, HUGE_VAL)) return "tolerance: negative or not finite";
+    if (!isogi_dvr__within(d->bound, 0, 1) || (d->bound > 0 && d->bound < 1e-4)) return "bound: neither 0 nor 1e-4 .. 1";
+    if (!isogi_dvr__within(d->radius, 0, ISOGI_DVR__LOCAL_STEPS) || (d->radius > 0 && d->radius < 1))
+        return "radius: neither 0 nor 1 .. 32";
+    if (!isogi_dvr__within(d->reduction, 0, HUGE_VAL) || (d->reduction > 0 && d->reduction < 1))
+        return "reduction: neither 0 nor 1 or more";
+    return NULL;
+}
+
+ISOGI_API const char *isogi_dvr_fault(const isogi_dvr_desc *desc) {
+    const isogi_dvr_desc *d = desc;
+    int a;
+    if (!d) return "desc: NULL";
+    if (!d->pyramid) return "pyramid: NULL";
+    if (!isogi_vol_volume(d->pyramid)->data) return "pyramid: of a function, which has no voxels";
+    if (d->space != ISOGI_DVR_PHYSICAL && d->space != ISOGI_DVR_DATA) return "space: none of isogi_dvr_space";
+    if ((unsigned)d->shading > ISOGI_DVR_TWO_SIDED) return "shading: none of isogi_dvr_shading";
+    if ((unsigned)d->classification > ISOGI_DVR_POST_CLASSIFIED) return "classification: none of isogi_dvr_classification";
+    if ((unsigned)d->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return "silhouette: none of isogi_dvr_silhouette";
+    if ((unsigned)d->normals > ISOGI_NORMAL_TRILINEAR) return "normals: none of isogi_normal_kind";
+    if (d->table < 0 || d->table == 1 || d->table > 1024) return "table: neither 0 nor 2 .. 1024";
+    for (a = 0; a < 3; a++)
+        if (!isogi_dvr__material_ok(&d->material[a])) return "material: a colour is negative, or an exponent not 0 .. 1e6";
+    if (isogi_dvr__points_fault(d->second_points, d->second_count))
+        return "second_points, second_count: what isogi_transfer_fault says of such points";
+    if (!isogi_dvr__within(d->unit, 0, HUGE_VAL)) return "unit: negative or not finite";
+    if (!isogi_dvr__within(d->step, 0, 1e4) || (d->step > 0 && d->step < 1e-4)) return "step: neither 0 nor 1e-4 .. 1e4";
+    if (!isogi_dvr__finite32(d->opaque) || !(d->opaque >= 0 && d->opaque <= 1)) return "opaque: not 0 .. 1";
+    if (!isogi_dvr__finite64(d->anisotropy) || !(d->anisotropy > -1 && d->anisotropy < 1)) return "anisotropy: not between -1 and 1";
+    if (!isogi_dvr__within(d->emission, 0, 1e6)) return "emission: not 0 .. 1e6";
+    return isogi_dvr__visibility_fault(d);
 }
 
 static isogi_result isogi_dvr__resolve(isogi_dvr_desc *desc, const isogi_dvr_desc *given) {
     const isogi_volume *volume;
     int a;
-    if (!given || !given->pyramid) return ISOGI_INVALID;
+    if (isogi_dvr_fault(given)) return ISOGI_INVALID;
     *desc = *given;
     volume = isogi_vol_volume(desc->pyramid);
-    if (!volume->data) return ISOGI_INVALID; /* a field given by a function */
-    if (desc->space != ISOGI_DVR_PHYSICAL && desc->space != ISOGI_DVR_DATA) return ISOGI_INVALID;
-    if (desc->shading != ISOGI_DVR_UNLIT && desc->shading != ISOGI_DVR_VISIBILITY && desc->shading != ISOGI_DVR_LOCAL &&
-        desc->shading != ISOGI_DVR_TWO_SIDED)
-        return ISOGI_INVALID;
-    if ((unsigned)desc->classification > ISOGI_DVR_POST_CLASSIFIED ||
-        (unsigned)desc->silhouette > ISOGI_DVR_SILHOUETTE_GRADIENT) return ISOGI_INVALID;
-    if ((unsigned)desc->normals > ISOGI_NORMAL_TRILINEAR || desc->table < 0 || desc->table == 1 || desc->table > 1024) return ISOGI_INVALID;
-    for (a = 0; a < 3; a++)
-        if (!isogi_dvr__resolve_material(&desc->material[a], a == 2)) return ISOGI_INVALID;
-    if (!isogi_dvr__points_valid(desc->second_points, desc->second_count)) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++) isogi_dvr__resolve_material(&desc->material[a], a == 2);
     if (!desc->table) desc->table = 256;
-    if (!isogi_dvr__finite64(desc->unit) || !isogi_dvr__finite64(desc->step) || !isogi_dvr__finite32(desc->opaque)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->visibility_step)) return ISOGI_INVALID;
-    if (desc->coarsest < 0 || desc->coarsest > 8 || (desc->coarsest & (desc->coarsest - 1))) return ISOGI_INVALID;
     if (!desc->coarsest) desc->coarsest = 1;
-    if (!(desc->unit >= 0) || !(desc->step >= 0) || !(desc->visibility_step >= 0)) return ISOGI_INVALID;
-    if (!(desc->opaque >= 0 && desc->opaque <= 1)) return ISOGI_INVALID;
-    if (desc->order < 0 || desc->order > ISOGI_DVR__MAX_ORDER || desc->directions < 0 || desc->directions > 65536) return ISOGI_INVALID;
-    if ((int)desc->method < 0 || desc->method > ISOGI_DVR_SWEEP || (int)desc->sphere < 0 ||
-        desc->sphere > ISOGI_DVR_ICOSAHEDRON) return ISOGI_INVALID;
     if (!(desc->step > 0)) desc->step = 0.5;
-    if (desc->visibility_step > 0 && !(desc->visibility_step >= 1e-4 && desc->visibility_step <= 2e4)) return ISOGI_INVALID;
-    if (!(desc->step >= 1e-4 && desc->step <= 1e4)) return ISOGI_INVALID;
     if (!desc->method) desc->method = ISOGI_DVR_SWEEP;
-    if (!isogi_dvr__finite64(desc->anisotropy) || !(desc->anisotropy > -1 && desc->anisotropy < 1)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->tolerance) || !(desc->tolerance >= 0)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->bound) || !(desc->bound >= 0 && desc->bound <= 1)) return ISOGI_INVALID;
-    if (desc->bound > 0 && !(desc->bound >= 1e-4)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->emission) || !(desc->emission >= 0 && desc->emission <= 1e6)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite64(desc->radius) || !isogi_dvr__finite64(desc->reduction)) return ISOGI_INVALID;
-    if (!(desc->radius >= 0) || !(desc->reduction >= 0)) return ISOGI_INVALID;
     if (!(desc->radius > 0)) desc->radius = 16;
     if (!(desc->reduction > 0)) desc->reduction = 4;
-    if (!(desc->radius >= 1 && desc->radius <= ISOGI_DVR__LOCAL_STEPS && desc->reduction >= 1)) return ISOGI_INVALID;
     if (!(desc->opaque > 0)) desc->opaque = 0.999f;
     if (!desc->order) desc->order = 3;
     if (!desc->directions) desc->directions = 64;
@@ -7324,16 +7360,34 @@ ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double
     for (a = 0; a < 3; a++) origin[a] = (double)view->eye[a], dir[a] = (float)d[a];
 }
 
-static isogi_result isogi_dvr__check_view(const isogi_view *view) {
+static const char *isogi_dvr__view_fault(const isogi_view *view, isogi_result *code) {
     size_t i, pixels;
-    if (!view || view->width < 1 || view->height < 1) return ISOGI_INVALID;
-    if (view->width > 32768 || view->height > 32768) return ISOGI_TOO_LARGE;
-    if (!isogi_dvr__finite3(view->eye) || !isogi_dvr__finite3(view->target) || !isogi_dvr__finite3(view->up)) return ISOGI_INVALID;
-    if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return ISOGI_INVALID;
+    *code = ISOGI_INVALID;
+    if (!view) return "view: NULL";
+    if (view->width < 1 || view->height < 1) return "width, height: below 1";
+    if (view->width > 32768 || view->height > 32768) return *code = ISOGI_TOO_LARGE, "width, height: above 32768";
+    if (!isogi_dvr__finite3(view->eye)) return "eye: not finite";
+    if (!isogi_dvr__finite3(view->target)) return "target: not finite";
+    if (!isogi_dvr__finite3(view->up)) return "up: not finite";
+    if (!isogi_dvr__finite32(view->fov) || !(view->fov >= 0 && view->fov < 180)) return "fov: not 0 .. below 180 (degrees)";
+    if ((unsigned)view->depth > ISOGI_DEPTH_FIRST) return "depth: none of isogi_depth_kind";
+    if ((unsigned)view->local > 1) return "local: not 0 or 1";
     pixels = view->until ? (size_t)view->width * (size_t)view->height : 0;
     for (i = 0; i < pixels; i++)
-        if (isogi_dvr__nan32(view->until[i])) return ISOGI_INVALID;
-    return (unsigned)view->depth > ISOGI_DEPTH_FIRST || (unsigned)view->local > 1 ? ISOGI_INVALID : ISOGI_OK;
+        if (isogi_dvr__nan32(view->until[i])) return "until: not a number";
+    *code = ISOGI_OK;
+    return NULL;
+}
+
+ISOGI_API const char *isogi_view_fault(const isogi_view *view) {
+    isogi_result code;
+    return isogi_dvr__view_fault(view, &code);
+}
+
+static isogi_result isogi_dvr__check_view(const isogi_view *view) {
+    isogi_result code;
+    isogi_dvr__view_fault(view, &code);
+    return code;
 }
 
 /* The distance from the eye at which the ray of a pixel ends. */

@@ -161,6 +161,8 @@ typedef struct isogi_lighting {
 
 /* Checks a lighting description: sizes, finite values, rotation orthonormal to 1e-3 (or zero). NULL is ISOGI_INVALID. */
 ISOGI_API isogi_result isogi_lighting_validate(const isogi_lighting *lighting);
+/* What is wrong with it: the member at fault and why, as "env.rotation: ...", for whoever writes the program; NULL where it is valid. */
+ISOGI_API const char *isogi_lighting_fault(const isogi_lighting *lighting);
 
 /* Radiance that arrives from `direction` (world, any length > 0) out of the environment alone: image (bilinear, wrapped in
    longitude, clamped at the poles) plus SH. */
@@ -5591,47 +5593,65 @@ static void isogi_sh__clamp(float *c, size_t count) {
         }
 }
 
-/* Two finite edges of some length, at right angles. */
-static int isogi_sh__edges_ok(const isogi_light *light) {
+static const char *isogi_sh__edges_fault(const isogi_light *light) {
     double aa = 0, bb = 0, ab = 0;
     int k;
-    if (!isogi_sh__finite_array(light->edge[0], 6)) return 0;
+    if (!isogi_sh__finite_array(light->edge[0], 6)) return "lights: a rectangle's edge is not finite";
     for (k = 0; k < 3; k++) {
         aa += (double)light->edge[0][k] * (double)light->edge[0][k], bb += (double)light->edge[1][k] * (double)light->edge[1][k];
         ab += (double)light->edge[0][k] * (double)light->edge[1][k];
     }
-    return aa > 0 && bb > 0 && fabs(ab) <= 1e-3 * sqrt(aa) * sqrt(bb);
+    if (!(aa > 0 && bb > 0)) return "lights: a rectangle's edge has no length";
+    return fabs(ab) <= 1e-3 * sqrt(aa) * sqrt(bb) ? NULL : "lights: a rectangle's edges are not at right angles";
 }
 
-static int isogi_sh__light_ok(const isogi_light *light) {
+static const char *isogi_sh__light_fault(const isogi_light *light) {
     int kind = (int)light->kind;
     const float *v = light->vector;
-    if (kind < (int)ISOGI_LIGHT_DIRECTIONAL || kind > (int)ISOGI_LIGHT_RECTANGLE) return 0;
+    if (kind < (int)ISOGI_LIGHT_DIRECTIONAL || kind > (int)ISOGI_LIGHT_RECTANGLE) return "lights: a kind that is none";
     /* before any comparison: with -ffast-math what equals zero may be taken for zero, and NaN for what equals zero */
-    if (!isogi_sh__finite_array(v, 3) || !isogi_sh__finite_array(light->rgb, 3)) return 0;
-    if (kind == (int)ISOGI_LIGHT_POINT) return 1;
-    if (kind == (int)ISOGI_LIGHT_RECTANGLE) return isogi_sh__edges_ok(light);
-    if (!isogi_sh__finite_f32(light->radius) || light->radius < 0) return 0;
-    return kind == (int)ISOGI_LIGHT_SPHERE ||
-           (fabs((double)v[0]) + fabs((double)v[1]) + fabs((double)v[2]) > 0 && light->radius <= 1.5707964f);
+    if (!isogi_sh__finite_array(v, 3)) return "lights: a vector is not finite";
+    if (!isogi_sh__finite_array(light->rgb, 3)) return "lights: an rgb is not finite";
+    if (kind == (int)ISOGI_LIGHT_POINT) return NULL;
+    if (kind == (int)ISOGI_LIGHT_RECTANGLE) return isogi_sh__edges_fault(light);
+    if (!isogi_sh__finite_f32(light->radius) || light->radius < 0) return "lights: a radius is negative or not finite";
+    if (kind == (int)ISOGI_LIGHT_SPHERE) return NULL;
+    if (!(fabs((double)v[0]) + fabs((double)v[1]) + fabs((double)v[2]) > 0)) return "lights: a direction has no length";
+    return light->radius <= 1.5707964f ? NULL : "lights: a directional light's radius is above pi / 2";
+}
+
+/* code: what a call returns for it. */
+static const char *isogi_sh__lighting_fault(const isogi_lighting *lighting, isogi_result *code) {
+    const isogi_env *env;
+    const char *fault = NULL;
+    double m[9];
+    size_t i;
+    *code = ISOGI_INVALID;
+    if (!lighting) return "lighting: NULL";
+    env = &lighting->env;
+    if (env->rgb && (env->width < 1 || env->height < 1)) return "env.width, env.height: below 1";
+    if (!env->rgb && (env->width || env->height)) return "env.width, env.height: a size, but env.rgb is NULL";
+    if (env->sh && !isogi_sh__order_ok(env->sh_order)) return "env.sh_order: not 1 .. ISOGI_SH_MAX_ORDER";
+    if (!env->sh && env->sh_order) return "env.sh_order: not 0, but env.sh is NULL";
+    if (lighting->light_count && !lighting->lights) return "lights: NULL, but light_count is not 0";
+    if (isogi_sh__env_rotation(m, env) != ISOGI_OK) return "env.rotation: neither all zero nor a rotation";
+    if (env->rgb && !isogi_sh__image_fits(env->width, env->height, 3)) return *code = ISOGI_TOO_LARGE, "env.width, env.height: too large";
+    if (env->rgb && !isogi_sh__finite_array(env->rgb, 3 * (size_t)env->width * (size_t)env->height)) return "env.rgb: not finite";
+    if (env->sh && !isogi_sh__finite_array(env->sh, 3 * ISOGI_SH_COUNT(env->sh_order))) return "env.sh: not finite";
+    for (i = 0; i < lighting->light_count && !fault; i++) fault = isogi_sh__light_fault(&lighting->lights[i]);
+    if (!fault) *code = ISOGI_OK;
+    return fault;
 }
 
 ISOGI_API isogi_result isogi_lighting_validate(const isogi_lighting *lighting) {
-    const isogi_env *env;
-    double m[9];
-    size_t i;
-    if (!lighting) return ISOGI_INVALID;
-    env = &lighting->env;
-    if (env->rgb ? env->width < 1 || env->height < 1 : env->width != 0 || env->height != 0) return ISOGI_INVALID;
-    if (env->sh ? !isogi_sh__order_ok(env->sh_order) : env->sh_order != 0) return ISOGI_INVALID;
-    if (lighting->light_count && !lighting->lights) return ISOGI_INVALID;
-    if (isogi_sh__env_rotation(m, env) != ISOGI_OK) return ISOGI_INVALID;
-    if (env->rgb && !isogi_sh__image_fits(env->width, env->height, 3)) return ISOGI_TOO_LARGE;
-    if (env->rgb && !isogi_sh__finite_array(env->rgb, 3 * (size_t)env->width * (size_t)env->height)) return ISOGI_INVALID;
-    if (env->sh && !isogi_sh__finite_array(env->sh, 3 * ISOGI_SH_COUNT(env->sh_order))) return ISOGI_INVALID;
-    for (i = 0; i < lighting->light_count; i++)
-        if (!isogi_sh__light_ok(&lighting->lights[i])) return ISOGI_INVALID;
-    return ISOGI_OK;
+    isogi_result code;
+    isogi_sh__lighting_fault(lighting, &code);
+    return code;
+}
+
+ISOGI_API const char *isogi_lighting_fault(const isogi_lighting *lighting) {
+    isogi_result code;
+    return isogi_sh__lighting_fault(lighting, &code);
 }
 
 /* Splits a texel coordinate into the texel left of it and the fraction towards the next. */

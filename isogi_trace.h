@@ -323,6 +323,9 @@ typedef struct isogi_trace isogi_trace;
 
 /* context: memory, threads, progress of isogi_trace_step; NULL = the pyramid's. */
 ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context);
+/* Why isogi_trace_create refuses a description: the member at fault and why, as "samples: not 0 .. 2^24", for whoever writes the program;
+   NULL where it does not (but for memory). What is wrong with lighting is told as by isogi_lighting_fault. */
+ISOGI_API const char *isogi_trace_fault(const isogi_trace_desc *desc);
 ISOGI_API void isogi_trace_free(isogi_trace *trace);
 
 /* Asks for the texels that isogi_trace_sample reads at these world points. Needed when desc.lazy; else a no-op. On failure some of
@@ -1976,12 +1979,6 @@ static int isogi_trace__table_valid(const isogi_albedo_point *p, size_t count, f
     return 1;
 }
 
-static int isogi_trace__material_valid(const isogi_trace_desc *d) {
-    if (!isogi_trace__in_range_rgb(d->albedo, 1) || !isogi_trace__table_valid(d->albedo_points, d->albedo_count, 1)) return 0;
-    if (d->emission_count && d->mode != ISOGI_TRACE_IRRADIANCE) return 0;
-    return isogi_trace__table_valid(d->emission_points, d->emission_count, 1e30f);
-}
-
 /* Distant light alone can be relit without rays. */
 static int isogi_trace__distant(const isogi_lighting *lighting) {
     size_t i;
@@ -1990,33 +1987,51 @@ static int isogi_trace__distant(const isogi_lighting *lighting) {
     return 1;
 }
 
-static int isogi_trace__fields_valid(const isogi_trace_desc *d) {
-    if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return 0;
-    if (d->method != ISOGI_TRACE_FEEDBACK && d->method != ISOGI_TRACE_PATHS) return 0;
-    if (!isogi_trace__finite((double)d->error) || d->error < 0) return 0;
-    if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return 0;
-    if (d->lookup != ISOGI_TRACE_TRILINEAR && d->lookup != ISOGI_TRACE_NEAREST && d->lookup != ISOGI_TRACE_CLOSEST_ISOVALUE &&
-        d->lookup != ISOGI_TRACE_BSPLINE)
-        return 0;
-    if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER || d->bounces < -1 || d->samples < 0 || d->samples > 1 << 24)
-        return 0;
-    if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return 0;
-    if (!isogi_trace__finite((double)d->offset)) return 0;
-    if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max) || d->isovalue_min > d->isovalue_max)
-        return 0;
-    if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return 0;
-    if (d->sides != ISOGI_TRACE_LOW_SIDE && d->sides != ISOGI_TRACE_HIGH_SIDE && d->sides != ISOGI_TRACE_BOTH_SIDES) return 0;
-    if (!isogi_trace__finite((double)d->reach) || d->reach < 0) return 0;
-    if (!isogi_trace__finite((double)d->hierarchy) || d->hierarchy < 0 || (d->hierarchy > 0 && d->lazy)) return 0;
-    if ((int)d->storage < 0 || d->storage > ISOGI_TRACE_BYTE || (d->storage == ISOGI_TRACE_RGB9E5 && d->mode == ISOGI_TRACE_TRANSFER))
-        return 0;
-    if (isogi_lighting_validate(&d->lighting) != ISOGI_OK || !isogi_trace__material_valid(d)) return 0;
-    return d->mode == ISOGI_TRACE_IRRADIANCE || isogi_trace__distant(&d->lighting);
+static const char *isogi_trace__light_fault(const isogi_trace_desc *d) {
+    const char *fault = isogi_lighting_fault(&d->lighting);
+    const int transfer = d->mode == ISOGI_TRACE_TRANSFER;
+    if (fault) return fault;
+    if (!isogi_trace__in_range_rgb(d->albedo, 1)) return "albedo: not 0 .. 1";
+    if (!isogi_trace__table_valid(d->albedo_points, d->albedo_count, 1))
+        return "albedo_points, albedo_count: NULL, not ascending, or a colour not 0 .. 1";
+    if (d->emission_count && transfer) return "emission_count: not 0, which is not for ISOGI_TRACE_TRANSFER";
+    if (!isogi_trace__table_valid(d->emission_points, d->emission_count, 1e30f))
+        return "emission_points, emission_count: NULL, not ascending, or a colour not 0 .. 1e30";
+    return !transfer || isogi_trace__distant(&d->lighting) ? NULL : "lights: only directional ones for ISOGI_TRACE_TRANSFER";
 }
 
-/* A field given by a function has no voxels to be baked. offset: in voxels. */
-static int isogi_trace__desc_valid(const isogi_trace_desc *d) {
-    return d && d->pyramid && isogi_vol_volume(d->pyramid)->data && isogi_trace__fields_valid(d) && d->offset <= 1;
+/* What is wrong with the members that need no pyramid. */
+static const char *isogi_trace__fields_fault(const isogi_trace_desc *d) {
+    if (d->mode != ISOGI_TRACE_IRRADIANCE && d->mode != ISOGI_TRACE_TRANSFER) return "mode: none of isogi_trace_mode";
+    if (d->method != ISOGI_TRACE_FEEDBACK && d->method != ISOGI_TRACE_PATHS) return "method: none of isogi_trace_method";
+    if (!isogi_trace__finite((double)d->error) || d->error < 0) return "error: negative or not finite";
+    if (d->normals != ISOGI_NORMAL_SMOOTH && d->normals != ISOGI_NORMAL_TRILINEAR) return "normals: none of isogi_normal_kind";
+    if ((int)d->lookup < 0 || d->lookup > ISOGI_TRACE_BSPLINE) return "lookup: none of isogi_trace_lookup";
+    if (d->order < 0 || d->order > ISOGI_TRACE__MAX_ORDER) return "order: not 0 .. 6";
+    if (d->bounces < -1) return "bounces: below -1";
+    if (d->samples < 0 || d->samples > 1 << 24) return "samples: not 0 .. 2^24";
+    if (d->transfer_channels != 0 && d->transfer_channels != 1 && d->transfer_channels != 3) return "transfer_channels: not 0, 1 or 3";
+    if (!isogi_trace__finite((double)d->offset)) return "offset: not finite";
+    if (!isogi_trace__finite(d->isovalue_min) || !isogi_trace__finite(d->isovalue_max)) return "isovalue_min, isovalue_max: not finite";
+    if (d->isovalue_min > d->isovalue_max) return "isovalue_min: above isovalue_max";
+    if (!isogi_trace__finite3(d->lattice_min) || !isogi_trace__finite3(d->lattice_max)) return "lattice_min, lattice_max: not finite";
+    if (d->sides != ISOGI_TRACE_LOW_SIDE && d->sides != ISOGI_TRACE_HIGH_SIDE && d->sides != ISOGI_TRACE_BOTH_SIDES)
+        return "sides: none of isogi_trace_sides";
+    if (!isogi_trace__finite((double)d->reach) || d->reach < 0) return "reach: negative or not finite";
+    if (!isogi_trace__finite((double)d->hierarchy) || d->hierarchy < 0) return "hierarchy: negative or not finite";
+    if (d->hierarchy > 0 && d->lazy) return "hierarchy: not for lazy textures";
+    if ((int)d->storage < 0 || d->storage > ISOGI_TRACE_BYTE) return "storage: none of isogi_trace_format";
+    if (d->storage == ISOGI_TRACE_RGB9E5 && d->mode == ISOGI_TRACE_TRANSFER) return "storage: ISOGI_TRACE_RGB9E5 holds no transfer";
+    return isogi_trace__light_fault(d);
+}
+
+/* And with those that a gathering at points needs, too. A field given by a function has no voxels to be baked. offset: in voxels. */
+static const char *isogi_trace__desc_fault(const isogi_trace_desc *d) {
+    if (!d) return "desc: NULL";
+    if (!d->pyramid) return "pyramid: NULL";
+    if (!isogi_vol_volume(d->pyramid)->data) return "pyramid: of a function, which has no voxels: isogi_trace_gather_field";
+    if (d->offset > 1) return "offset: above 1 voxel";
+    return isogi_trace__fields_fault(d);
 }
 
 /* Grey surfaces need one set of coefficients. */
@@ -2713,27 +2728,73 @@ static int isogi_trace__by_cubes(const isogi_trace_desc *d) {
     return d->method == ISOGI_TRACE_FEEDBACK && !d->lazy && !(d->hierarchy > 0);
 }
 
-static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
+/* The texels that a description means: places of the first and the last, and how many; of the box, the first and the one past the last. */
+typedef struct isogi_trace__extent {
+    double first[3], last[3];
+    size_t lattice[3], box_first[3], box_end[3];
+} isogi_trace__extent;
+
+static void isogi_trace__extent_of(const isogi_trace_desc *d, isogi_trace__extent *f) {
+    int whole = 1, boxed = 0, a;
+    for (a = 0; a < 3; a++) {
+        whole &= isogi_trace__zero(d->lattice_min[a]) && isogi_trace__zero(d->lattice_max[a]);
+        boxed |= d->box_first[a] || d->box_end[a];
+    }
+    for (a = 0; a < 3; a++) {
+        double span;
+        f->first[a] = whole ? 0 : d->lattice_min[a];
+        f->last[a] = whole ? (double)(isogi_vol_volume(d->pyramid)->size[a] - 1) : d->lattice_max[a];
+        span = isogi_trace__clamp(f->last[a] - f->first[a], 0x7fffffff);
+        f->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(span + 0.5) + 1;
+        f->box_first[a] = boxed ? d->box_first[a] : 0, f->box_end[a] = boxed ? d->box_end[a] : f->lattice[a];
+    }
+}
+
+/* code: what isogi_trace_create returns for it. */
+static const char *isogi_trace__fault(const isogi_trace_desc *d, isogi_result *code) {
+    const char *fault = isogi_trace__desc_fault(d);
+    isogi_trace__extent f;
+    size_t bricks = 1;
+    int a;
+    *code = ISOGI_INVALID;
+    if (fault) return fault;
+    isogi_trace__extent_of(d, &f);
+    for (a = 0; a < 3; a++) {
+        if (f.first[a] < 0 || f.last[a] > (double)(isogi_vol_volume(d->pyramid)->size[a] - 1))
+            return "lattice_min, lattice_max: not within the volume (voxels)";
+        if (f.last[a] < f.first[a]) return "lattice_min: above lattice_max";
+        if (f.box_first[a] > f.box_end[a] || f.box_end[a] > f.lattice[a]) return "box_first, box_end: not ascending, or not in the lattice";
+        if (d->hierarchy > 0 && (f.box_first[a] || f.box_end[a] != f.lattice[a])) return "hierarchy: not for a box";
+    }
+    *code = ISOGI_TOO_LARGE;
+    for (a = 0; a < 3; a++) {
+        const size_t size = f.lattice[a] / ISOGI_TRACE__SIDE + 1; /* bricks */
+        if (f.lattice[a] > 0x7fffffff) return "lattice: above 2^31 - 1";
+        if (bricks > SIZE_MAX / sizeof(void *) / ISOGI_TRACE__TEXELS / size) return "lattice: too large to be addressed";
+        bricks *= size;
+    }
+    *code = ISOGI_OK;
+    return NULL;
+}
+
+ISOGI_API const char *isogi_trace_fault(const isogi_trace_desc *desc) {
+    isogi_result code;
+    return isogi_trace__fault(desc, &code);
+}
+
+static void isogi_trace__set_lattice(isogi_trace *t) {
     const isogi_trace_desc *d = &t->scene.desc;
-    int whole = 1, a, boxed, empty;
-    for (a = 0; a < 3; a++) whole &= isogi_trace__zero(d->lattice_min[a]) && isogi_trace__zero(d->lattice_max[a]);
+    isogi_trace__extent f;
+    int a, empty;
+    isogi_trace__extent_of(d, &f);
     t->brick_count = 1;
     for (a = 0; a < 3; a++) {
-        double end = (double)(t->scene.volume->size[a] - 1);
-        t->first[a] = whole ? 0 : d->lattice_min[a], t->last[a] = whole ? end : d->lattice_max[a];
-        if (t->first[a] < 0 || t->last[a] < t->first[a] || t->last[a] > end) return ISOGI_INVALID;
-        t->lattice[a] = d->lattice[a] ? d->lattice[a] : (size_t)(t->last[a] - t->first[a] + 0.5) + 1;
-        if (t->lattice[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
+        t->first[a] = f.first[a], t->last[a] = f.last[a], t->lattice[a] = f.lattice[a];
+        t->box_first[a] = f.box_first[a], t->box_end[a] = f.box_end[a];
         if (t->lattice[a] == 1) t->first[a] = t->last[a] = (t->first[a] + t->last[a]) / 2;
         t->step[a] = t->lattice[a] > 1 ? (t->last[a] - t->first[a]) / (double)(t->lattice[a] - 1) : 0;
         t->size[a] = (t->lattice[a] + ISOGI_TRACE__SIDE - 1) / ISOGI_TRACE__SIDE;
-        if (t->brick_count > SIZE_MAX / sizeof(void *) / ISOGI_TRACE__TEXELS / t->size[a]) return ISOGI_TOO_LARGE;
         t->brick_count *= t->size[a];
-    }
-    for (boxed = a = 0; a < 3; a++) boxed |= d->box_first[a] || d->box_end[a];
-    for (a = 0; a < 3; a++) {
-        t->box_first[a] = boxed ? d->box_first[a] : 0, t->box_end[a] = boxed ? d->box_end[a] : t->lattice[a];
-        if (t->box_first[a] > t->box_end[a] || t->box_end[a] > t->lattice[a]) return ISOGI_INVALID;
     }
     empty = t->box_first[0] == t->box_end[0] || t->box_first[1] == t->box_end[1] || t->box_first[2] == t->box_end[2];
     for (a = 0; a < 3 && isogi_trace__by_cubes(d) && !empty; a++) { /* texels of a cube share light: all of them, or none */
@@ -2741,7 +2802,6 @@ static isogi_result isogi_trace__set_lattice(isogi_trace *t) {
         t->box_first[a] -= t->box_first[a] % ISOGI_TRACE_CUBE, beyond -= beyond % ISOGI_TRACE_CUBE;
         t->box_end[a] = beyond < t->lattice[a] ? beyond : t->lattice[a];
     }
-    return ISOGI_OK;
 }
 
 /* TRANSFER: an environment's image by blocks, their means and these cut. */
@@ -2878,8 +2938,8 @@ static void isogi_trace__set_light(isogi_trace *t, const isogi_trace__lit *lit) 
 static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *desc) {
     isogi_result result = isogi_trace__scene_set(&t->scene, desc, &t->context);
     isogi_trace__lit lit;
-    if (result == ISOGI_OK) result = isogi_trace__set_lattice(t);
     if (result != ISOGI_OK) return result;
+    isogi_trace__set_lattice(t);
     t->values =
         desc->mode == ISOGI_TRACE_TRANSFER ? t->scene.desc.order * t->scene.desc.order * t->scene.desc.transfer_channels : 3;
     t->least = 1;
@@ -2910,10 +2970,9 @@ static isogi_result isogi_trace__set_up(isogi_trace *t, const isogi_trace_desc *
 static isogi_result isogi_trace__coarse_create(isogi_trace *t, const isogi_context *context) {
     isogi_trace_desc desc = t->scene.desc;
     int a;
-    for (a = 0; a < 3; a++) {
-        if (t->box_first[a] || t->box_end[a] != t->lattice[a]) return ISOGI_INVALID;
+    for (a = 0; a < 3; a++)
         desc.lattice[a] = (t->lattice[a] + 2) / 2, desc.lattice_min[a] = t->first[a], desc.lattice_max[a] = t->last[a];
-    }
+    memset(desc.box_first, 0, sizeof desc.box_first), memset(desc.box_end, 0, sizeof desc.box_end);
     desc.hierarchy = 0, desc.lazy = 0, desc.sides = t->scene.high ? ISOGI_TRACE_HIGH_SIDE : ISOGI_TRACE_LOW_SIDE;
     return isogi_trace_create(&t->coarse, &desc, context);
 }
@@ -2928,7 +2987,8 @@ static void isogi_trace__share(isogi_trace *t, double from, double to) {
 ISOGI_API isogi_result isogi_trace_create(isogi_trace **trace, const isogi_trace_desc *desc, const isogi_context *context) {
     isogi_trace *t;
     isogi_result result;
-    if (!trace || !isogi_trace__desc_valid(desc)) return ISOGI_INVALID;
+    if (!trace) return ISOGI_INVALID;
+    if (isogi_trace__fault(desc, &result)) return result;
     if (!context) context = isogi_vol_context(desc->pyramid);
     t = (isogi_trace *)isogi_allocate(context, 1, sizeof *t);
     if (!t) return ISOGI_NO_MEMORY;
@@ -7452,7 +7512,7 @@ static isogi_result isogi_trace__apply(isogi_trace *trace, const isogi_trace_des
 }
 
 ISOGI_API isogi_result isogi_trace_change(isogi_trace *trace, const isogi_trace_desc *desc) {
-    if (!trace || !isogi_trace__desc_valid(desc) || !isogi_trace__same_texels(trace, desc)) return ISOGI_INVALID;
+    if (!trace || isogi_trace__desc_fault(desc) || !isogi_trace__same_texels(trace, desc)) return ISOGI_INVALID;
     return isogi_trace__apply(trace, desc, NULL, NULL);
 }
 
@@ -7541,7 +7601,7 @@ ISOGI_API isogi_result isogi_trace_gather(const isogi_trace_desc *desc, const fl
     isogi_trace__points job;
     isogi_result result;
     size_t tasks, waves = count ? (count - 1) / ISOGI_TRACE__TASK + 1 : 0;
-    if (!isogi_trace__desc_valid(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
+    if (isogi_trace__desc_fault(desc) || desc->mode != ISOGI_TRACE_IRRADIANCE || (count && (!points || !irradiance)))
         return ISOGI_INVALID;
     if (desc->sides == ISOGI_TRACE_BOTH_SIDES) return ISOGI_INVALID;
     if (!count) return ISOGI_OK;
@@ -7768,7 +7828,7 @@ ISOGI_API isogi_result isogi_trace_gather_field(const isogi_trace_desc *desc, is
     isogi_trace__field f;
     isogi_lighting sky;
     isogi_result result;
-    if (!desc || !intersect || (count && (!points || !normals || !irradiance)) || !isogi_trace__fields_valid(desc)) return ISOGI_INVALID;
+    if (!desc || !intersect || (count && (!points || !normals || !irradiance)) || isogi_trace__fields_fault(desc)) return ISOGI_INVALID;
     if (desc->mode != ISOGI_TRACE_IRRADIANCE || desc->offset < 0) return ISOGI_INVALID;
     if (!count) return ISOGI_OK;
     memset(&f, 0, sizeof f);

@@ -255,6 +255,8 @@ typedef struct isogi_volume {
 } isogi_volume;
 
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
+/* What is wrong with it: the member at fault and why, as "spacing: negative", for whoever writes the program; NULL where it is valid. */
+ISOGI_API const char *isogi_volume_fault(const isogi_volume *volume);
 
 /* Voxels as all of the library reads them, in double; for a volume whose zero defaults are filled in: that of isogi_vol_volume.
    isogi_volume_corners: the eight values of a cell, corner x + 2y + 4z; an axis of one voxel repeats it. 1 if all are finite. A cell
@@ -1079,51 +1081,75 @@ static isogi_volume isogi_vol__resolve(const isogi_volume *volume) {
     return v;
 }
 
-/* Sizes within range, and every voxel's byte offset within ptrdiff_t. */
-static isogi_result isogi_vol__check_layout(const isogi_volume *v, size_t type_size) {
+/* Sizes within range, and every voxel's byte offset within ptrdiff_t. code: what a call returns for what is not. */
+static const char *isogi_vol__layout_fault(const isogi_volume *v, size_t type_size, isogi_result *code) {
     size_t reach = type_size; /* of the axes so far: the stride of the next one, where voxels are packed */
     int zero = !v->stride[0] && !v->stride[1] && !v->stride[2], a;
     for (a = 0; a < 3; a++) {
         ptrdiff_t stride = zero ? (ptrdiff_t)reach : v->stride[a];
         size_t step, span = v->size[a] - 1;
-        if (!v->size[a]) return ISOGI_INVALID;
-        if (v->size[a] > 0x7fffffff || v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return ISOGI_TOO_LARGE;
-        if ((double)v->first[a] > 9007199254740992.0) return ISOGI_TOO_LARGE; /* 2^53 */
-        if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return ISOGI_TOO_LARGE;
+        if (!v->size[a]) return "size: 0";
+        *code = ISOGI_TOO_LARGE;
+        if (v->size[a] > 0x7fffffff) return "size: above 2^31 - 1";
+        if (v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return "halo_low, halo_high: above 2^31 - 1";
+        if ((double)v->first[a] > 9007199254740992.0) return "first: above 2^53";
+        if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return "size, halo_low, halo_high: too large";
+        *code = ISOGI_INVALID;
         span += v->halo_low[a] + v->halo_high[a];
-        if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return ISOGI_INVALID;
+        if (stride == PTRDIFF_MIN || stride % (ptrdiff_t)type_size) return "stride: no multiple of the size of a voxel's type";
         step = (size_t)(stride < 0 ? -stride : stride);
-        if (span && step > ((size_t)PTRDIFF_MAX - reach) / span) return ISOGI_TOO_LARGE;
+        if (span && step > ((size_t)PTRDIFF_MAX - reach) / span) return *code = ISOGI_TOO_LARGE, "size, stride: too large to be addressed";
         reach += step * span;
     }
-    return ISOGI_OK;
+    return NULL;
 }
 
-ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
+static const char *isogi_vol__geometry_fault(const isogi_volume *volume) {
     static const double largest[6] = {255, 128, 65535, 32768, (double)FLT_MAX, 1};
-    size_t type_size;
     double length = 1, determinant;
     isogi_volume v;
-    isogi_result result;
     int a;
-    if (!volume || !volume->data) return ISOGI_INVALID;
-    type_size = isogi_vol__type_size(volume->type);
-    if (!type_size || (uintptr_t)volume->data % type_size) return ISOGI_INVALID;
-    result = isogi_vol__check_layout(volume, type_size);
-    if (result != ISOGI_OK) return result;
     for (a = 0; a < 9; a++)
-        if (!isogi_vol__finite64(volume->axes[a])) return ISOGI_INVALID;
-    if (!isogi_vol__finite64(volume->scale) || !isogi_vol__finite64(volume->bias)) return ISOGI_INVALID;
-    if (!isogi_vol__finite3(volume->origin) || !isogi_vol__finite3(volume->spacing)) return ISOGI_INVALID;
+        if (!isogi_vol__finite64(volume->axes[a])) return "axes: not finite";
+    if (!isogi_vol__finite64(volume->scale) || !isogi_vol__finite64(volume->bias)) return "scale, bias: not finite";
+    if (!isogi_vol__finite3(volume->origin)) return "origin: not finite";
+    if (!isogi_vol__finite3(volume->spacing)) return "spacing: not finite";
     v = isogi_vol__resolve(volume);
-    if (!(fabs(v.scale) <= 1e300 && fabs(v.bias) <= 1e300 && fabs(v.scale) * largest[v.type] + fabs(v.bias) <= 1e300)) return ISOGI_INVALID;
+    if (!(fabs(v.scale) <= 1e300 && fabs(v.bias) <= 1e300 && fabs(v.scale) * largest[v.type] + fabs(v.bias) <= 1e300))
+        return "scale, bias: values beyond 1e300";
     for (a = 0; a < 3; a++) {
         double x = v.axes[a], y = v.axes[3 + a], z = v.axes[6 + a];
-        if (!(v.spacing[a] > 0)) return ISOGI_INVALID;
+        if (!(v.spacing[a] > 0)) return "spacing: negative";
         length *= sqrt(x * x + y * y + z * z);
     }
     determinant = fabs(isogi_vol__determinant(v.axes));
-    return determinant > 1e-9 * length && isogi_vol__finite64(determinant) ? ISOGI_OK : ISOGI_INVALID;
+    return determinant > 1e-9 * length && isogi_vol__finite64(determinant) ? NULL : "axes: (nearly) in one plane, or too long";
+}
+
+static const char *isogi_vol__fault(const isogi_volume *volume, isogi_result *code) {
+    const char *fault;
+    size_t type_size;
+    *code = ISOGI_INVALID;
+    if (!volume) return "volume: NULL";
+    if (!volume->data) return "data: NULL";
+    type_size = isogi_vol__type_size(volume->type);
+    if (!type_size) return "type: none of isogi_type";
+    if ((uintptr_t)volume->data % type_size) return "data: not aligned to its type";
+    fault = isogi_vol__layout_fault(volume, type_size, code);
+    if (!fault) fault = isogi_vol__geometry_fault(volume);
+    if (!fault) *code = ISOGI_OK;
+    return fault;
+}
+
+ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume) {
+    isogi_result code;
+    isogi_vol__fault(volume, &code);
+    return code;
+}
+
+ISOGI_API const char *isogi_volume_fault(const isogi_volume *volume) {
+    isogi_result code;
+    return isogi_vol__fault(volume, &code);
 }
 
 static void isogi_vol__transform(const double m[9], const double v[3], double out[3]) {

@@ -48,6 +48,18 @@ static jmp_buf test_leave;
     }                                                                                              \
     static void test_body_##name(void)
 
+/* Whether what is said of a description names something that the change to it, as C text, names, too. */
+static inline int fault_names(const char *fault, const char *change) {
+    const char *word = "abcdefghijklmnopqrstuvwxyz_0123456789";
+    size_t length;
+    for (; fault && *change; change += length ? length : 1) {
+        length = strspn(change, word);
+        for (const char *at = fault; length > 1 && *at; at += strspn(at, word) + (strspn(at, word) == 0))
+            if (strspn(at, word) == length && !memcmp(at, change, length)) return 1;
+    }
+    return 0;
+}
+
 /* CHECK(condition, "format", values...): the format and its values are printed when the condition is false */
 #define CHECK(condition, ...)                                                                      \
     do {                                                                                           \

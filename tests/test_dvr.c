@@ -1114,7 +1114,10 @@ TEST(bad_input_is_refused) {
     isogi_dvr *dvr = NULL;
     isogi_dvr_desc good = {.pyramid = f.pyramid}, bad;
     CHECK(isogi_dvr_create(NULL, &good, NULL) == ISOGI_INVALID && isogi_dvr_create(&dvr, NULL, NULL) == ISOGI_INVALID, "NULL");
-#define REFUSED(change, code) bad = good, bad.change; CHECK(isogi_dvr_create(&dvr, &bad, NULL) == code && !dvr, #change)
+#define REFUSED(change, code)                                                                                                  \
+    bad = good, bad.change;                                                                                                    \
+    CHECK(isogi_dvr_create(&dvr, &bad, NULL) == code && !dvr, #change);                                                        \
+    CHECK(code != ISOGI_INVALID || fault_names(isogi_dvr_fault(&bad), #change), "%s: %s", #change, isogi_dvr_fault(&bad))
     REFUSED(pyramid = NULL, ISOGI_INVALID);
     REFUSED(space = (isogi_dvr_space)2, ISOGI_INVALID);
     REFUSED(shading = (isogi_dvr_shading)4, ISOGI_INVALID);
@@ -1131,14 +1134,15 @@ TEST(bad_input_is_refused) {
     REFUSED(grid[1] = SIZE_MAX, ISOGI_TOO_LARGE);
     good.shading = ISOGI_DVR_VISIBILITY;
     REFUSED(grid[0] = bad.grid[1] = bad.grid[2] = 0x7fffffff, ISOGI_TOO_LARGE);
-    CHECK(isogi_dvr_create(&dvr, &good, &serial) == ISOGI_OK, "the good one");
+    CHECK(isogi_dvr_create(&dvr, &good, &serial) == ISOGI_OK && !isogi_dvr_fault(&good) && isogi_dvr_fault(NULL), "the good one");
 
     isogi_transfer_point points[2] = {{0, {1, 1, 1}, 1}, {1, {1, 1, 1}, 1}}, kept = points[1];
     isogi_peak peaks[257] = {{0, {1, 1, 1}, 0.5f}}, peak = peaks[0];
     isogi_transfer t = {points, 2, peaks, 1};
-    CHECK(isogi_dvr_set_transfer(dvr, &t) == ISOGI_OK && isogi_transfer_validate(&t) == ISOGI_OK, "the good one");
+    CHECK(isogi_dvr_set_transfer(dvr, &t) == ISOGI_OK && !isogi_transfer_fault(&t), "the good one");
 #define WRONG(part, whole, change)                                                                                             \
-    part = whole, part.change; CHECK(isogi_dvr_set_transfer(dvr, &t) == ISOGI_INVALID, #change); part = whole
+    part = whole, part.change; CHECK(isogi_dvr_set_transfer(dvr, &t) == ISOGI_INVALID, #change);                               \
+    CHECK(fault_names(isogi_transfer_fault(&t), #change), "%s: %s", #change, isogi_transfer_fault(&t)); part = whole
     WRONG(points[1], kept, value = -1);
     WRONG(points[1], kept, value = (double)NAN);
     WRONG(points[1], kept, value = (double)INFINITY);
@@ -1162,7 +1166,9 @@ TEST(bad_input_is_refused) {
     isogi_view view;
     CHECK(isogi_dvr_render(dvr, &fine, &dark, image, NULL, NULL) == ISOGI_OK && image[0][3] > 0.5f, "the good one stays: opacity %g",
           (double)image[0][3]);
-#define UNSEEN(change, code) view = fine, view.change; CHECK(isogi_dvr_render(dvr, &view, &dark, image, NULL, NULL) == code, #change)
+#define UNSEEN(change, code)                                                                                                   \
+    view = fine, view.change; CHECK(isogi_dvr_render(dvr, &view, &dark, image, NULL, NULL) == code, #change);                  \
+    CHECK(fault_names(isogi_view_fault(&view), #change), "%s: %s", #change, isogi_view_fault(&view))
     UNSEEN(width = 0, ISOGI_INVALID);
     UNSEEN(height = -5, ISOGI_INVALID);
     UNSEEN(width = 40000, ISOGI_TOO_LARGE);
@@ -1172,7 +1178,8 @@ TEST(bad_input_is_refused) {
     UNSEEN(fov = -1, ISOGI_INVALID);
     UNSEEN(up[2] = NAN, ISOGI_INVALID);
     CHECK(isogi_dvr_render(dvr, &fine, NULL, image, NULL, NULL) == ISOGI_INVALID, "no lighting while lit");
-    CHECK(isogi_dvr_render(dvr, NULL, &dark, image, NULL, NULL) == ISOGI_INVALID, "no view");
+    CHECK(isogi_dvr_render(dvr, NULL, &dark, image, NULL, NULL) == ISOGI_INVALID && isogi_view_fault(NULL), "no view");
+    CHECK(!isogi_view_fault(&fine), "nothing is wrong with it");
     CHECK(isogi_dvr_render(NULL, &fine, &dark, image, NULL, NULL) == ISOGI_INVALID, "no renderer");
     CHECK(isogi_dvr_render(dvr, &fine, &dark, NULL, NULL, NULL) == ISOGI_INVALID, "no picture");
     CHECK(isogi_dvr_render(dvr, &fine, &dark, image, NULL, NULL) == ISOGI_OK, "the good one");

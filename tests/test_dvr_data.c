@@ -1193,7 +1193,10 @@ TEST(bad_descriptions_are_refused) {
     const isogi_transfer_point wrong[] = {{1, {1, 1, 1}, 0}, {0, {1, 1, 1}, 0}};
     const isogi_dvr_desc good = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA};
     isogi_dvr_desc bad;
-#define REFUSED(change) bad = good, bad.change; CHECK(isogi_dvr_create(&dvr, &bad, &serial) == ISOGI_INVALID && !dvr, #change)
+#define REFUSED(change)                                                                                                        \
+    bad = good, bad.change;                                                                                                    \
+    CHECK(isogi_dvr_create(&dvr, &bad, &serial) == ISOGI_INVALID && !dvr, #change);                                            \
+    CHECK(fault_names(isogi_dvr_fault(&bad), #change), "%s: %s", #change, isogi_dvr_fault(&bad))
     REFUSED(classification = (isogi_dvr_classification)3);
     REFUSED(classification = (isogi_dvr_classification)-1);
     REFUSED(silhouette = (isogi_dvr_silhouette)4);
@@ -1208,6 +1211,17 @@ TEST(bad_descriptions_are_refused) {
     REFUSED(material[2].specular[2] = INFINITY);
     REFUSED(second_count = 1);
     REFUSED(second_count = 2; bad.second_points = wrong);
+    REFUSED(method = (isogi_dvr_method)9);
+    REFUSED(sphere = (isogi_dvr_sphere)9);
+    REFUSED(coarsest = 3);
+    REFUSED(tolerance = (double)NAN);
+    REFUSED(anisotropy = 1);
+    REFUSED(emission = -1);
+    REFUSED(bound = 1e-5);
+    REFUSED(radius = 33);
+    REFUSED(radius = 0.5);
+    REFUSED(reduction = 0.5);
+    REFUSED(visibility_step = 3e4);
     field_free(&f);
 }
 

@@ -2217,11 +2217,12 @@ TEST(lighting_is_validated) {
     CHECK(isogi_lighting_validate(NULL) == ISOGI_INVALID, "%s", "NULL");
     CHECK(isogi_lighting_validate(&zero) == ISOGI_OK, "%s", "zero is black");
     CHECK(isogi_sh_project(out, 3, &zero, NULL) == ISOGI_OK && out[0] == 0 && out[26] == 0, "black: %g", (double)out[0]);
-    CHECK(isogi_lighting_validate(&good) == ISOGI_OK, "%s", "good");
+    CHECK(isogi_lighting_validate(&good) == ISOGI_OK && !isogi_lighting_fault(&good), "%s", "good");
 #define BAD(change, code)                                                                                                                  \
     bad = good;                                                                                                                            \
     change;                                                                                                                                \
     CHECK(isogi_lighting_validate(&bad) == code, "%s", #change);                                                                           \
+    CHECK(fault_names(isogi_lighting_fault(&bad), #change), "%s: %s", #change, isogi_lighting_fault(&bad));                                \
     CHECK(isogi_sh_project(out, 3, &bad, NULL) == code, "%s", #change)
     BAD(bad.env.width = 0, ISOGI_INVALID);
     BAD(bad.env.height = -1, ISOGI_INVALID);
@@ -2245,6 +2246,7 @@ TEST(lighting_is_validated) {
         CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "vector %g", (double)wrong[i]);
         lights[0].vector[1] = 1, lights[0].radius = wrong[i];
         CHECK(isogi_lighting_validate(&good) == ISOGI_INVALID, "radius %g", (double)wrong[i]);
+        CHECK(fault_names(isogi_lighting_fault(&good), "lights.radius"), "%s", isogi_lighting_fault(&good));
         lights[0].radius = 0;
     }
     lights[0].vector[1] = 0;

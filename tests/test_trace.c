@@ -1337,6 +1337,7 @@ TEST(bad_input_is_refused) {
         d = good;                                                                                                                \
         change;                                                                                                                  \
         CHECK(refused(&d, result), "%s", #change);                                                                               \
+        CHECK(fault_names(isogi_trace_fault(&d), #change), "%s: %s", #change, isogi_trace_fault(&d));                            \
     } while (0)
     REFUSED(d.pyramid = NULL, ISOGI_INVALID);
     REFUSED(d.albedo[1] = 1.5f, ISOGI_INVALID);
@@ -1360,6 +1361,24 @@ TEST(bad_input_is_refused) {
     REFUSED(d.lookup = (isogi_trace_lookup)4, ISOGI_INVALID);
     REFUSED((d.mode = ISOGI_TRACE_TRANSFER, d.lighting.lights = &lamp, d.lighting.light_count = 1), ISOGI_INVALID);
     REFUSED(d.lighting.light_count = 1, ISOGI_INVALID);
+    REFUSED(d.method = (isogi_trace_method)2, ISOGI_INVALID);
+    REFUSED(d.error = -1, ISOGI_INVALID);
+    REFUSED(d.normals = (isogi_normal_kind)2, ISOGI_INVALID);
+    REFUSED(d.sides = (isogi_trace_sides)3, ISOGI_INVALID);
+    REFUSED(d.reach = (float)nan, ISOGI_INVALID);
+    REFUSED(d.hierarchy = -1, ISOGI_INVALID);
+    REFUSED((d.hierarchy = 0.5f, d.lazy = 1), ISOGI_INVALID);
+    REFUSED((d.hierarchy = 0.5f, d.box_end[0] = d.box_end[1] = d.box_end[2] = 8), ISOGI_INVALID);
+    REFUSED(d.storage = (isogi_trace_format)9, ISOGI_INVALID);
+    REFUSED((d.storage = ISOGI_TRACE_RGB9E5, d.mode = ISOGI_TRACE_TRANSFER), ISOGI_INVALID);
+    REFUSED(d.emission_count = 1, ISOGI_INVALID);
+    REFUSED((d.emission_count = 1, d.emission_points = points, d.mode = ISOGI_TRACE_TRANSFER), ISOGI_INVALID);
+    REFUSED(d.box_end[1] = 17, ISOGI_INVALID);
+    REFUSED((d.box_first[1] = 5, d.box_end[1] = 4), ISOGI_INVALID);
+    REFUSED(d.lattice_min[2] = -0.5, ISOGI_INVALID);
+    REFUSED((d.lattice_min[2] = 8, d.lattice_max[2] = 7, d.lattice_max[0] = d.lattice_max[1] = 9), ISOGI_INVALID);
+    REFUSED(d.lighting.env.rotation[3] = 1, ISOGI_INVALID);
+    CHECK(!isogi_trace_fault(&good) && isogi_trace_fault(NULL), "nothing is wrong with it: %s", isogi_trace_fault(&good));
     CHECK(isogi_trace_create(NULL, &good, NULL) == ISOGI_INVALID && isogi_trace_create(&t, NULL, NULL) == ISOGI_INVALID, "NULL");
     CHECK(isogi_trace_step(NULL, 0, NULL) == ISOGI_INVALID && isogi_trace_request(NULL, NULL, 0) == ISOGI_INVALID, "NULL texture");
     isogi_trace_free(NULL);

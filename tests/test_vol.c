@@ -464,32 +464,31 @@ TEST(bad_volumes_are_refused) {
     float voxel[8] = {0};
     const isogi_volume good = {.data = voxel, .type = ISOGI_F32, .size = {2, 2, 2}};
     isogi_pyramid *p = (isogi_pyramid *)1;
-    isogi_volume v = good;
-    CHECK(isogi_volume_validate(&good) == ISOGI_OK, "good");
-    CHECK(isogi_vol_build(&p, NULL, NULL) == ISOGI_INVALID, "null");
-    v.data = NULL;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "no data");
-    v = good, v.data = (const char *)voxel + 1;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "misaligned");
-    v = good, v.type = (isogi_type)17;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "type");
-    v = good, v.size[1] = 0;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "zero size");
-    v = good, v.size[0] = v.size[1] = v.size[2] = 0x7fffffff;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_TOO_LARGE, "overflow");
-    v = good, v.size[0] = 0x80000000u;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_TOO_LARGE, "axis too long");
+    isogi_volume v;
+    CHECK(isogi_volume_validate(&good) == ISOGI_OK && !isogi_volume_fault(&good), "good");
+    CHECK(isogi_vol_build(&p, NULL, NULL) == ISOGI_INVALID && isogi_volume_fault(NULL), "null");
+#define REFUSED(change, code)                                                                                                  \
+    v = good, change;                                                                                                          \
+    CHECK(isogi_vol_build(&p, &v, NULL) == code && isogi_volume_validate(&v) == code, #change);                                \
+    CHECK(fault_names(isogi_volume_fault(&v), #change), "%s: %s", #change, isogi_volume_fault(&v))
+    REFUSED(v.data = NULL, ISOGI_INVALID);
+    REFUSED(v.data = (const char *)voxel + 1, ISOGI_INVALID);
+    REFUSED(v.type = (isogi_type)17, ISOGI_INVALID);
+    REFUSED(v.size[1] = 0, ISOGI_INVALID);
+    REFUSED((v.size[0] = v.size[1] = v.size[2] = 0x7fffffff), ISOGI_TOO_LARGE);
+    REFUSED(v.size[0] = 0x80000000u, ISOGI_TOO_LARGE);
+    REFUSED(v.halo_low[1] = 0x80000000u, ISOGI_TOO_LARGE);
     for (int i = 0; i < 3; i++) {
         const double bad[3] = {-1, (double)NAN, (double)INFINITY};
-        v = good, v.spacing[i] = bad[i];
-        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "spacing %g", bad[i]);
+        REFUSED(v.spacing[i] = bad[i], ISOGI_INVALID);
     }
-    v = good, v.axes[0] = v.axes[4] = 1;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "singular axes");
-    v = good, v.stride[0] = 3, v.stride[1] = 8, v.stride[2] = 16;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "stride");
-    v = good, v.scale = (double)NAN;
-    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_INVALID, "scale");
+    REFUSED(v.axes[0] = v.axes[4] = 1, ISOGI_INVALID); /* singular */
+    REFUSED(v.axes[1] = (double)NAN, ISOGI_INVALID);
+    REFUSED(v.origin[2] = (double)INFINITY, ISOGI_INVALID);
+    REFUSED((v.stride[0] = 3, v.stride[1] = 8, v.stride[2] = 16), ISOGI_INVALID);
+    REFUSED(v.scale = (double)NAN, ISOGI_INVALID);
+    REFUSED(v.bias = 1e301, ISOGI_INVALID);
+#undef REFUSED
     CHECK(p == (isogi_pyramid *)1, "the output was touched");
 }
 
