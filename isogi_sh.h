@@ -41,8 +41,9 @@
    - rings around bright lights             isogi_sh_window with a width of about the order, or isogi_sh_dering
    - coefficients from other software       isogi_sh_convert
 
-   How many coefficients? Order 3 (9) holds irradiance to 1 %; order 5 (25) visibility and soft light; a light of angular radius a
-   is seen as such from order pi / a on. Energy left in the last band (isogi_sh_band_energy) tells what the order misses.
+   How many coefficients? Order 3 (9) holds all but 1 % of the energy of irradiance, but under a single small light errs by up to 9 % of
+   its largest value (order 5: 6 %); order 5 (25) holds visibility and soft light; a light of angular radius a is seen as such from order
+   pi / a on. Energy left in the last band (isogi_sh_band_energy) tells what the order misses.
 
    What a window costs: every window blurs, and at width = order keeps half (Lanczos 64 %) of degree order / 2. The deepest ring of a
    delta at order 8 is 14 % of its peak; with a Hann, Lanczos or Gauss window of that width 2.9, 4.5 and 2.7 %. To leave nothing
@@ -71,7 +72,9 @@
                 All bounds assume IEEE arithmetic: -ffast-math may reorder what cancels, and costs up to four times as much, six at
                 degree 100. Where denormal numbers are flushed to zero (FTZ, DAZ), vectors shorter than 1e-37 (double 1e-307) have no
                 direction.
-   Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable.
+   Limits       Order 1..101 (degree 0..100), 1..16 channels. Counts times order^2 must be addressable, random samples up to 2^30, and a
+                function's resolution up to 2^20: else ISOGI_TOO_LARGE. Any rounding mode will do; floating-point exceptions must not
+                trap (feenableexcept), as compilers divide before they ask whether they may.
 
    Conventions  Real, orthonormal, without the Condon-Shortley phase, index i = l (l + 1) + m (ACN). Y1..Y3 = sqrt(3 / 4 pi) (y, z, x).
                 An expansion of several channels is interleaved: c[channels i + channel]. Directions need not be normalised.
@@ -159,7 +162,7 @@ typedef struct isogi_lighting {
     size_t light_count;
 } isogi_lighting;
 
-/* Checks a lighting description: sizes, finite values, rotation orthonormal to 1e-3 (or zero). NULL is ISOGI_INVALID. */
+/* Checks a lighting description: sizes, finite values, rotation within 1e-3 (isogi_sh_rotate) or zero. NULL is ISOGI_INVALID. */
 ISOGI_API isogi_result isogi_lighting_validate(const isogi_lighting *lighting);
 /* What is wrong with it: the member at fault and why, as "env.rotation: ...", for whoever writes the program; NULL where it is valid. */
 ISOGI_API const char *isogi_lighting_fault(const isogi_lighting *lighting);
@@ -235,11 +238,11 @@ ISOGI_API isogi_result isogi_sh_project(float *rgb, int order, const isogi_light
 /* ---- rotation ---- */
 
 /* Rotates: out expands f(R^-1 w), so that a lobe towards d turns into a lobe towards R d; m is R, row-major. ISOGI_INVALID unless
-   m is a rotation to 1e-3 (a reflection is none); the nearest Euler angles are used where it is off by more than 1e-6. out may be in.
-   Wigner's d(pi/2) between rotations about z: exact at any degree, where the recursion of Ivanic and Ruedenberg (1996, 1998) loses digits
-   beyond 30. One channel of order 3 to 5 in float is turned as tensors by the matrix as it is, whose roundings add up: up to 1e-3 of the
-   norm after 10,000 calls with one matrix; others drift by 2e-5 of it, and in double by 2e-12. To go on turning, rotate the first expansion
-   by the product of the matrices, or use double. */
+   m is a rotation: entries of m m^T within 1e-3 of those of 1, determinant above 0; the nearest Euler angles are used where it is off by
+   more than 1e-6. out may be in. Wigner's d(pi/2) between rotations about z: exact at any degree, where the recursion of Ivanic and
+   Ruedenberg (1996, 1998) loses digits beyond 30. One channel of order 3 to 5 in float is turned as tensors by the matrix as it is, whose
+   roundings add up: up to 1e-3 of the norm after 10,000 calls with one matrix; others drift by 2e-5 of it, and in double by 2e-12. To go
+   on turning, rotate the first expansion by the product of the matrices, or use double. */
 ISOGI_API isogi_result isogi_sh_rotate(float *out, const float *in, int order, int channels, const float m[9]);
 ISOGI_API isogi_result isogi_sh_rotate_f64(double *out, const double *in, int order, int channels, const double m[9]);
 
@@ -298,16 +301,16 @@ ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order);
    of floats, at order 5 to 4.5e-7 of the largest z. */
 ISOGI_API isogi_result isogi_sh_zonal_to_direction(float *c, int order, const float *zonal, const float direction[3]);
 
-/* Factors that fade high degrees, against rings. width > 0, in degrees: HANN (1 + cos(pi l / width)) / 2 and LANCZOS
+/* Factors that fade high degrees, against rings. width > 0 and finite, in degrees: HANN (1 + cos(pi l / width)) / 2 and LANCZOS
    sin(pi l / width) / (pi l / width) below width, 0 from there on; GAUSS 2^-(2 l / width)^2. */
 typedef enum isogi_sh_window_kind { ISOGI_SH_HANN = 0, ISOGI_SH_LANCZOS, ISOGI_SH_GAUSS } isogi_sh_window_kind;
 ISOGI_API isogi_result isogi_sh_window(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double width);
 
 /* The widest (weakest) window under which no channel is negative anywhere: certainly nothing below -1e-5 of its largest value is left,
    and windows that are wider by steps of 2 % all leave something below -1e-6. width (may be NULL) receives it, at most 1e-5 of it too
-   narrow, or 0 where none is needed. It takes 1 to 10 milliseconds a channel at order 8, 5 to 80 at 16, and up to two seconds at 32,
-   longest where a bright light stands in a dark sky. ISOGI_INVALID where a channel's mean is negative. Order 32 at most, else
-   ISOGI_TOO_LARGE. */
+   narrow, or 0 where none is needed (which isogi_sh_window does not take). It takes 1 to 10 milliseconds a channel at order 8, 5 to 80 at
+   16, and up to two seconds at 32, longest where a bright light stands in a dark sky. ISOGI_INVALID where a channel's mean is negative.
+   Order 32 at most, else ISOGI_TOO_LARGE. */
 ISOGI_API isogi_result isogi_sh_dering(float *out, const float *in, int order, int channels, isogi_sh_window_kind kind, double *width);
 
 /* energy[order]: the sum of squares over each degree and all channels. */
@@ -3918,9 +3921,9 @@ ISOGI_API isogi_result isogi_sh_mirror(float *out, const float *in, int order, i
 
 ISOGI_API double isogi_sh_dot(const float *a, const float *b, int order) {
     double sum = 0;
-    int i, n = order * order;
+    int i;
     if (!a || !b || !isogi_sh__order_ok(order)) return 0;
-    for (i = 0; i < n; i++) sum += (double)a[i] * (double)b[i];
+    for (i = 0; i < order * order; i++) sum += (double)a[i] * (double)b[i];
     return sum;
 }
 

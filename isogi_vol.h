@@ -54,7 +54,7 @@
                 cut large fields into thick chunks.
                 From malloc, blocks of 4 MB and more ask Linux for huge pages: a pyramid is then built in 1/5 (virtual machines) to 7/10
                 of the time. Where your voxels lie in such pages, too (madvise, or isogi_allocate), many rays are 5 to 10 % faster.
-                A mesh keeps some 3/4 byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are long
+                A mesh keeps about a byte of scratch memory for every voxel until it is freed (1 to 2 where rows along x are long
                 but no multiple of 64 voxels, 4 where they have 17, 36 where they have 2).
                 Stack use stays below 32 KB; where the compiler does not optimise, below 70 (gcc) and 140 (clang), and AVX-512 is not
                 used then, which would take more.
@@ -66,7 +66,8 @@
                 bits on two ways need be so. These bits may differ, too, where the compiler fuses multiply-adds, as gcc does with
                 -march=native unless told -ffp-contract=off: hits are then the same, their t and place but for roundings.
                 Where a program has denormal numbers flushed to zero (FTZ, DAZ), values that differ by less than 1e-37 are equal; all else
-                holds.
+                holds. Any rounding mode will do. Threads of a pool keep the modes of the thread that made them come: set these before.
+                Floating-point exceptions must not trap (feenableexcept): what is divided by zero, or is no number, is masked later.
    Accuracy     Rays are solved in double: against a long double reference no hit is missed or added, and t is right to 1e-12 cell, or
                 to its own rounding where the origin is far, but for grazing rays, whose t is ill-conditioned by nature. A ray that runs
                 within the surface, where the field is the isovalue along a stretch of it, has the side that rounding gives it, and
@@ -191,7 +192,8 @@ ISOGI_API void isogi_thread_pool_free(isogi_thread_pool *pool); /* NULL is fine 
 ISOGI_API isogi_thread_pool *isogi_thread_pool_begin(isogi_context *context);
 ISOGI_API void isogi_thread_pool_end(isogi_context *context, isogi_thread_pool *pool);
 
-/* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0.
+/* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0;
+   patterns of infinities and NaN are read as the numbers after 65504.
    All in integers, but for what is below 2^-14 on the way back: no denormal float is touched, which would take a hundred times as long. */
 static inline uint16_t isogi_float_to_half(float x) {
     uint32_t bits, sign, shift, rest;
@@ -243,7 +245,8 @@ typedef struct isogi_volume {
                             halo included; a single 0 repeats one voxel along that axis */
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
-    double axes[9];      /* row-major 3x3, column a = world direction of grid axis a, invertible; all 0 = identity */
+    double axes[9];      /* row-major 3x3, column a = world direction of grid axis a; all 0 = identity; its determinant finite and above
+                            1e-9 of the product of the columns' lengths */
     double scale, bias;  /* scale 0 = 1; up to 1e300, and so is |scale raw| + |bias| for every finite number that the type holds; of
                             ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
@@ -254,6 +257,7 @@ typedef struct isogi_volume {
                     but rays is slower. 0: for speed */
 } isogi_volume;
 
+/* Checks a description, but for the voxels themselves, which are not read. */
 ISOGI_API isogi_result isogi_volume_validate(const isogi_volume *volume);
 /* What is wrong with it: the member at fault and why, as "spacing: negative", for whoever writes the program; NULL where it is valid. */
 ISOGI_API const char *isogi_volume_fault(const isogi_volume *volume);
@@ -335,18 +339,19 @@ typedef struct isogi_field {
     /* the same for a smaller box, where that is less; NULL = hessian everywhere */
     double (*hessian_in)(void *user, const double low[3], const double high[3]);
     double low[3], high[3]; /* low < high */
-    size_t cells[3];        /* of the lattice, along x, y, z; 0 = 64 */
+    size_t cells[3];        /* of the lattice, along x, y, z; 0 = 64; some 1/8 byte for each */
 } isogi_field;
 
 ISOGI_API isogi_result isogi_vol_build_field(isogi_pyramid **pyramid, const isogi_field *field, const isogi_context *context);
 
 /* ---- values and gradients ---------------------------------------------------------------------------------------------- */
 
-/* What lies between the voxels. Value and gradient of the cubic filters come from 4x4x4 voxels, which continue linearly beyond the
-   border. On the Marschner-Lobb signal at 81^3 voxels: RMS error of values (of a range of 1), mean angle between gradients, and by
-   how much samples leave the range of their voxels: trilinear 0.010, 17 degrees, 0; B-spline 0.017, 3.2 degrees, 0; Catmull-Rom
-   0.0025, 4.4 degrees, 0.006; B-spline of prefiltered voxels (isogi_vol_prefilter) 0.0004, 0.7 degrees, 0.012. At 41^3: 0.034, 32,
-   0; 0.046, 20, 0; 0.025, 22, 0; 0.016, 12, 0.003. */
+/* What lies between the voxels. Value and gradient of the cubic filters come from 4x4x4 voxels, which continue linearly beyond the border.
+   On the Marschner-Lobb signal at 81^3 voxels: RMS error of values (of a range of 1), mean angle between gradients, and by how much
+   samples leave the range of their voxels, all but for two voxels at the border (where the cubic ones err twice as much, and that of
+   prefiltered voxels ten times): trilinear 0.010, 17 degrees, 0; B-spline 0.017, 3.2 degrees, 0; Catmull-Rom 0.0025, 4.4 degrees, 0.006;
+   B-spline of prefiltered voxels (isogi_vol_prefilter) 0.0004, 0.7 degrees, 0.012. At 41^3: 0.034, 32, 0; 0.046, 20, 0; 0.025, 22, 0;
+   0.016, 12, 0.003. */
 typedef enum isogi_filter {
     ISOGI_FILTER_LINEAR = 0, /* trilinear: what rays and meshes see. Its gradient jumps at cell faces: the cell on the higher side counts */
     ISOGI_FILTER_BSPLINE,    /* uniform cubic B-spline with the voxels as control points: smooths; continuous second derivatives; the
@@ -419,13 +424,14 @@ ISOGI_API isogi_result isogi_vol_intersect(const isogi_pyramid *pyramid, const i
 /* 1 where there is any hit, else 0: cheaper than the hit itself. */
 ISOGI_API isogi_result isogi_vol_occluded(const isogi_pyramid *pyramid, const isogi_ray *rays, size_t count, uint8_t *occluded,
                                           isogi_counters *counters);
-/* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t is
-   not read; of its side, only whether it is a cap, unless with ISOGI_RAY_ONWARD). The root they start from is divided out of the cell's
-   cubic: no epsilon, no self-hit, no leak. A start may be 1e-9 cell off the surface. So where the surface comes back within as much,
-   through the face of a cell that lies between, it is not told from the start, but for rays that go onward: they miss no crossing,
-   however close it follows. t of the new hit counts from the start. Where the surface has no thickness (a single layer of voxels that
-   equal the isovalue) a ray touches it in one point: that is a hit with side +1, and the ray goes on outside. tmax[count] (0 = unlimited),
-   or NULL. flags as in isogi_ray. hits may be starts. */
+/* Rays that leave from hits, or from any other place given as cell + local that lies ON the surface of this isovalue (its t is not read;
+   of its side, only whether it is a cap, unless with ISOGI_RAY_ONWARD). The root they start from is divided out of the cell's cubic: no
+   epsilon, no self-hit, no leak. Cells end at size - 2, where local is 1 at the border, and a miss is no start: its ray would leave from
+   voxel 0. A start may be 1e-9 cell off the surface. So where the surface comes back within as much, through the face of a cell that lies
+   between, it is not told from the start, but for rays that go onward: they miss no crossing, however close it follows. t of the new hit
+   counts from the start. Where the surface has no thickness (a single layer of voxels that equal the isovalue) a ray touches it in one
+   point: that is a hit with side +1, and the ray goes on outside. tmax[count] (0 = unlimited), or NULL. flags as in isogi_ray. hits may be
+   starts. */
 ISOGI_API isogi_result isogi_vol_continue(const isogi_pyramid *pyramid, const isogi_hit *starts, const float (*dirs)[3],
                                           const double *tmax, double isovalue, uint32_t flags, size_t count, isogi_hit *hits,
                                           isogi_counters *counters);
@@ -8802,15 +8808,19 @@ ISOGI_API isogi_result isogi_vol_bundle_all(const isogi_pyramid *pyramid, const 
                                             size_t capacity, isogi_hit *hits, size_t *counts, isogi_counters *counters) {
     isogi_ray rays[ISOGI_VOL__GROUP];
     isogi_vol__followers f;
+    isogi_bundle own;
+    isogi_hit start;
     size_t first, i;
     if (!pyramid || !bundle || (count && (!dirs || !counts || (capacity && !hits)))) return ISOGI_INVALID;
     if (count && capacity > SIZE_MAX / sizeof *hits / count) return ISOGI_TOO_LARGE;
+    own = *bundle; /* its start may lie among the hits */
+    if (bundle->start) start = *bundle->start, own.start = &start;
     memset(rays, 0, sizeof rays);
     for (i = 0; i < ISOGI_VOL__GROUP; i++) rays[i].tmax = bundle->tmax, rays[i].isovalue = bundle->isovalue, rays[i].flags = bundle->flags;
     for (first = 0; first < count; first += f.size) {
         f.size = f.count = count - first < ISOGI_VOL__GROUP ? count - first : ISOGI_VOL__GROUP;
         for (i = 0; i < f.count; i++) memcpy(rays[i].dir, dirs[first + i], sizeof rays[i].dir);
-        isogi_vol_bundle(pyramid, bundle, dirs + first, f.count, f.hit, counters);
+        isogi_vol_bundle(pyramid, &own, dirs + first, f.count, f.hit, counters);
         isogi_vol__follow_all(pyramid, &f, rays, capacity, capacity ? hits + first * capacity : NULL, counts + first, counters);
     }
     return ISOGI_OK;

@@ -335,7 +335,8 @@ TEST(bundles_have_all_hits_of_single_rays) {
             const size_t count = turn % 4 ? RAYS : (size_t)v % 40, room = turn & 4 ? MOST : 2;
             memcpy(bundle.origin, ray.origin, sizeof bundle.origin);
             isogi_vol_intersect(f.pyramid, &ray, 1, &start, NULL);
-            if (turn & 2 && start.side) bundle.start = &start;
+            hits[0] = start; /* which may lie among the hits */
+            if (turn & 2 && start.side) bundle.start = turn & 1 ? hits : &start;
             else bundle.tmin = turn & 4 ? 1.5 : 0;
             for (int i = 0; i < RAYS; i++) {
                 double d[3];
