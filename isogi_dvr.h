@@ -168,8 +168,8 @@
 
    - No light on tetrahedral meshes, no scattering beyond the first, no refraction, no glossy surfaces.
    - Pictures of physical space without a bound are pre-integrated (ISOGI_DVR_EXACT is the same there), unless they have peaks among
-     the values that occur, local shading (ISOGI_DVR_LOCAL, isogi_view.local), anisotropy, jitter, an axis of one
-     voxel, or floats that tell too few values apart (see Limits): those are post-classified, and features narrower than the value's
+     the values that occur, shading by gradients (ISOGI_DVR_LOCAL, ISOGI_DVR_TWO_SIDED) or isogi_view.local, anisotropy, jitter, an axis
+     of one voxel, or floats that tell too few values apart (see Limits): those are post-classified, and features narrower than the value's
      change from sample to sample need a smaller step.
      Pre-classification (colours interpolated instead of values) is left out on purpose: in data space it would depend on the view, and it
      blurs every surface to the width of a voxel.
@@ -192,25 +192,25 @@
    The pyramid (and the voxels below it) is borrowed and must outlive the renderer; description, context and transfer function are
    copied (not what they point to: the second field and its points are borrowed). Visibility takes grid points * order^2 floats (in several
    resolutions a third to 1.4 times as many, as blocks hold their borders each, and a third such set while sweeps finish), with light 4
-   more during a picture, 8 where matter is dense for the grid; sweeps as many again (then only until they are done), two floats for each
-   node of their lattice, and during a step, for each of up to 16 directions, a float for each grid point and about 6 m (m + 24) of scratch
-   for m nodes on the longest axis; the paper's method then 12 MB, with a radius above 16 voxels 47 MB, between sheared axes up to 200.
-   Empty blocks take one byte for each block of the pyramid; a picture in work 20 bytes a pixel, and 64 kB
-   to 1 MB of classes of values in physical space; the transfer function of exact rays, and of those with a bound, 160 to 220 bytes a point,
-   of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's allocator; where that fails the call says so and
-   changes nothing.
+   more during a picture, 8 where matter is dense for the grid; sweeps as many again (in several resolutions only until they are done),
+   three floats for each node of their lattice, and during a step, for each of up to 16 directions, a float for each grid point and about 6
+   m (m + 24) of scratch for m nodes on the longest axis; the paper's method 32 bytes for each node of local visibility, and before that 12
+   MB, with a radius above 16 voxels 47 MB, between sheared axes up to 200. Empty blocks take four bytes for each block of the pyramid; a
+   picture in work 20 bytes a pixel, and 64 kB to 1 MB of classes of values in physical space; the transfer function of exact rays, and of
+   those with a bound, 160 to 220 bytes a point, of pre-integrated ones 16 table^2 and 8 a point more. All of it comes from the context's
+   allocator; where that fails the call says so and changes nothing.
    Stack use stays below 32 KB (unoptimised below 70 by gcc, 140 by clang; no AVX-512 of its own is used then).
    isogi_dvr_set_transfer, _set_clip and _step are writers: one at a time, and not during another call with the same renderer. All
    other calls only read and may run at the same time. Calls divide their own work among the context's threads. Results are the
    same bits for any number of threads and however visibility was cut into steps. All promises of equal bits are for IEEE arithmetic:
    with -ffast-math pictures differ by roundings, and values must lie within 8e307.
 
-   Samples stand at the middle of pieces of equal length, counted from where the ray enters the box (or from the eye inside it);
-   the last piece is what is left up to where the ray leaves the box, is cut by a clip plane or ends at geometry (isogi_view.until).
-   Blocks of the pyramid in which the transfer function has no extinction are stepped over, largest first; the samples elsewhere stay where
-   they are, so pictures are the same bits as without stepping over. In data space a block of one value, or one whose values meet neither
-   extinction nor peak, is empty too. A block in which all values have one extinction and one colour is passed in one piece by brute-force
-   visibility rays and by post-classified unlit ones (if all voxels are finite).
+   Samples stand at the middle of pieces of equal length, counted from where the ray enters what is shown of the box (or from the eye
+   inside it; a clip plane that is moved moves them all); the last piece is what is left up to where the ray leaves the box, is cut by a
+   clip plane or ends at geometry (isogi_view.until). Blocks of the pyramid in which the transfer function has no extinction are stepped
+   over, largest first; the samples elsewhere stay where they are, so pictures are the same bits as without stepping over. In data space a
+   block of one value, or one whose values meet neither extinction nor peak, is empty too. A block in which all values have one extinction
+   and one colour is passed in one piece by brute-force visibility rays and by post-classified unlit ones (if all voxels are finite).
 
    Limits
 
@@ -323,7 +323,7 @@ typedef enum isogi_dvr_silhouette {
 
 /* One side of a surface, for ISOGI_DVR_TWO_SIDED. All zero: plain diffuse. */
 typedef struct isogi_material {
-    float diffuse[3];  /* factor on the transfer function's colour, >= 0; all zero = 1 */
+    float diffuse[3];  /* factor on the transfer function's colour, >= 0; all zero = 1: for none, something tiny */
     float specular[3]; /* Phong highlight, >= 0; for transmission a factor on the transfer function's colour, all zero = 1 */
     float exponent;    /* of the highlight, 0..1e6; 0 = no specular part */
 } isogi_material;
@@ -378,7 +378,9 @@ typedef struct isogi_dvr_desc {
     isogi_material material[3];  /* two-sided: seen from lower values, seen from higher values, light that comes through */
     const isogi_pyramid *second; /* borrowed: a field that colours peaks; NULL = none. Its value at a crossing, through these points,
                                     gives a */
-    const isogi_transfer_point *second_points; /* factor on the peak's colour; borrowed; their extinction means nothing */
+    const isogi_transfer_point *second_points; /* factor on the peak's colour; borrowed; their extinction means nothing, but is checked.
+                                                  Beyond its box the second field is what it is at its border; the factor is 1 without
+                                                  points, or where the field is NaN */
     size_t second_count;
 } isogi_dvr_desc;
 
@@ -389,18 +391,21 @@ typedef enum isogi_depth_kind {
     ISOGI_DEPTH_HALF = 0, /* where half of the pixel's final opacity is reached: what stands for a surface among rasterized geometry. It
                              only says which of both is in front: for geometry inside of matter there is isogi_view.until */
     ISOGI_DEPTH_FIRST     /* where opacity begins (a 2^-40th of the final one): geometry before it is not covered by anything; of rays that
-                             are sampled up to a step too far, of exact ones (data space, or a bound) right to rounding */
+                             are sampled up to a step off, mostly too near; of exact ones (data space, or a bound), and of
+                             pre-integrated ones of physical space, right to rounding */
 } isogi_depth_kind;
 
 /* A pinhole camera. width x height pixels, row 0 on top; neither orthographic nor off its axis. Of a view matrix M and a projection P, by
-   columns as in OpenGL: target = eye - (M[2], M[6], M[10]), up = (M[1], M[5], M[9]), fov = 2 atan(1 / P[5]) 180 / pi. */
+   columns as in OpenGL: target = eye - r (M[2], M[6], M[10]), r the distance of what is looked at, as floats far from the origin lose
+   steps of 1, up = (M[1], M[5], M[9]), fov = 2 atan(1 / P[5]) 180 / pi. */
 typedef struct isogi_view {
     int width, height;              /* 1..32768 */
     float eye[3], target[3], up[3]; /* world; up: of any length; 0 = +y */
     float fov;                      /* vertical angle of view in degrees, below 180; 0 = 45 */
     int local;                      /* 0, or 1: shade by local visibility, for cut planes, and lights within. On the box's own faces it is
                                        too dark: matter fades there over one distance of nodes. ISOGI_INVALID where the paper's method
-                                       is not at work (another method, peaks, data space, an axis of one voxel, unlit, tetrahedra) */
+                                       is not at work (another method, peaks, data space, an axis of one voxel, voxels beyond floats,
+                                       shading other than ISOGI_DVR_VISIBILITY, tetrahedra) */
     isogi_depth_kind depth;         /* what is asked for where depth is */
     const float *until;             /* [height*width], borrowed for the call; NULL = no geometry: see below */
 } isogi_view;
@@ -419,7 +424,8 @@ ISOGI_API void isogi_view_ray(const isogi_view *view, double x, double y, double
 
 /* A renderer without a transfer function (all transparent) and without shadows. context NULL = the pyramid's. ISOGI_INVALID for a
    description outside its documented ranges. *dvr is written on success alone. The paper's method, for which voxels are read, calls the
-   progress callback, with a fraction of 0 throughout: ISOGI_CANCELLED where it asks for that. */
+   progress callback, with a fraction of 0 throughout: ISOGI_CANCELLED where it asks for that. Where voxels change (isogi_vol_update) a new
+   renderer has to be made. */
 ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *desc, const isogi_context *context);
 /* Why isogi_dvr_create refuses a description, and pictures a view: the member at fault and why, as "order: not 0 .. 6", for whoever writes
    the program; NULL where none is, but what is too large by several together, as grids, is told by the result alone, and so is `local`
@@ -436,15 +442,15 @@ ISOGI_API void isogi_dvr_free(isogi_dvr *dvr); /* NULL is fine */
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer);
 
 /* Computes visibility within about max_rays rays (0 = to the end), at least one grid point (brute force), block or direction (the paper's
-   method), plane of the lattice or direction (sweeps). Voxels that have to be read for it, after a change, count too: four of a plane
-   as a ray, a block as 64 rays for each direction. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is
-   finished stays and the next call goes on; but the points, planes, blocks or directions at work are lost, about a quarter of so many is
-   tried next, and one of them has to fit between two cancels: for slices of time budgets are better. Without ISOGI_DVR_VISIBILITY there is
-   nothing to do. */
+   method), plane of the lattice or direction (sweeps). Voxels that have to be read for it, after a change, count too: four of a plane as a
+   ray, a block as 64 rays for each direction; and so does the local visibility of a block, whose rays are short, but up to 4096 for each
+   direction. *remaining (may be NULL): fraction still to do, 0 = finished. When cancelled, what is finished stays and the next call goes
+   on; but the points, planes, blocks or directions at work are lost, about a quarter of so many is tried next, and one of them has to fit
+   between two cancels: for slices of time budgets are better. Without ISOGI_DVR_VISIBILITY there is nothing to do. */
 ISOGI_API isogi_result isogi_dvr_step(isogi_dvr *dvr, uint64_t max_rays, double *remaining);
 
 /* Interpolated visibility coefficients at world points: visibility[count][order*order]. Outside of the box a point is moved to its
-   nearest border point. ISOGI_INVALID without ISOGI_DVR_VISIBILITY. */
+   nearest border point (between sheared axes, along these). ISOGI_INVALID without ISOGI_DVR_VISIBILITY. */
 ISOGI_API isogi_result isogi_dvr_sample_visibility(const isogi_dvr *dvr, const float (*points)[3], size_t count, float *visibility);
 
 /* Keeps only where plane[0] x + plane[1] y + plane[2] z + plane[3] >= 0 (world) for all planes; at most ISOGI_DVR_MAX_PLANES, a box
@@ -492,7 +498,7 @@ ISOGI_API void isogi_dvr_counters(const isogi_dvr *dvr, isogi_counters *counters
 typedef enum isogi_preset {
     ISOGI_PRESET_GREY = 0,   /* one white, more of it for larger values */
     ISOGI_PRESET_HOT,        /* black, red, yellow, white: as bodies glow */
-    ISOGI_PRESET_COOL_WARM,  /* blue, white, red about the middle */
+    ISOGI_PRESET_COOL_WARM,  /* blue, light grey, red about the middle */
     ISOGI_PRESET_SPECTRUM    /* violet, blue, green, yellow, red */
 } isogi_preset;
 
@@ -508,10 +514,10 @@ enum {
     ISOGI_TABLE_PREMULTIPLIED = 2 /* colours are multiplied by opacity (before coding), to be divided by it */
 };
 
-/* A colour table of another program: rgba[count], 0..1, entry i for the value low + (high - low) i / (count - 1). Opacity is that of a path
-   of `length`, in units of isogi_dvr_desc.unit or, in data space, of data: extinction = -ln(1 - a) / length; an opacity of 1 counts as
-   1 - 2^-24. Where opacity is 0, premultiplied tables have no colour: black. ISOGI_INVALID: fewer than 2 entries, low >= high,
-   length <= 0, anything not finite or outside 0..1; points[] is written on success alone. */
+/* A colour table of another program: rgba[count], 0..1, entry i for the value low + (high - low) i / (count - 1). Opacity is that of a
+   path of `length`, in units of isogi_dvr_desc.unit or, in data space, of data: extinction = -ln(1 - a) / length; an opacity of 1 counts
+   as 1 - 2^-24. Where opacity is 0, premultiplied tables have no colour: black; where colour exceeds opacity it is 1. ISOGI_INVALID: fewer
+   than 2 entries, low >= high, length <= 0, anything not finite or outside 0..1; points[] is written on success alone. */
 ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t count, double low, double high, double length, int flags,
                                              isogi_transfer_point *points);
 
@@ -521,10 +527,10 @@ ISOGI_API isogi_result isogi_transfer_import(const float (*rgba)[4], size_t coun
    out, which is air or padding; and up to a thousandth of the voxels at either end of the range where that halves it), the lowest
    transparent, the others ever denser and warmer. In physical space extinction is per smallest voxel spacing and makes 1/30 of the
    diagonal, as long as the voxels in a row along it, half opaque soon after the third class begins (the fifth point), twice as dense at
-   the top, a fifth to a seventh of it in the second class: what is dense is seen within what is not; in data space a passage through each
-   upper class is about half opaque, less where the class is narrow: in proportion.
-   A volume of one value gets points that nothing meets. ISOGI_INVALID for a pyramid of a function, which has no voxels. threshold (may
-   be NULL): where the second class begins, for an isosurface. */
+   the top, a fifth to a seventh of it in the second class: what is dense is seen within what is not; in data space a passage through the
+   second class is a third opaque, through the third two thirds, less where they are narrow: in proportion. A volume of one value gets
+   points that nothing meets. ISOGI_INVALID for a pyramid of a function, which has no voxels. threshold (may be NULL): where the second
+   class begins, for an isosurface. */
 ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isogi_dvr_space space,
                                               isogi_transfer_point points[ISOGI_SUGGEST_POINTS], double *threshold);
 
@@ -558,8 +564,8 @@ typedef struct isogi_tet_desc {
 
 typedef struct isogi_tets isogi_tets; /* const once built: any number of threads may render it */
 
-/* Finds which tetrahedra share faces; some 40 bytes for each, 100 while it works. report may be NULL. ISOGI_INVALID for a point that does
-   not exist, and for anything that is not finite. */
+/* Finds which tetrahedra share faces; some 40 bytes for each and 70 for each face of the border, twice that while it works. report may be
+   NULL. ISOGI_INVALID for a point that does not exist, and for anything that is not finite. */
 ISOGI_API isogi_result isogi_dvr_tets_build(isogi_tets **tets, const isogi_tet_mesh *mesh, isogi_tet_report *report,
                                             const isogi_context *context);
 ISOGI_API void isogi_dvr_tets_free(isogi_tets *tets); /* NULL is fine */
@@ -2318,6 +2324,17 @@ static double isogi_dvr__edge(const isogi_volume *v, int axis) {
     return v->spacing[axis] * sqrt(m[0] * m[0] + m[3] * m[3] + m[6] * m[6]);
 }
 
+/* The smallest distance of neighbouring voxels; of a single voxel, which has no neighbour, what its spacing says. */
+static double isogi_dvr__shortest_edge(const isogi_volume *v) {
+    double shortest = 0;
+    int a;
+    for (a = 0; a < 3; a++) {
+        double length = isogi_dvr__edge(v, a);
+        if (v->size[a] > 1 && (!(shortest > 0) || length < shortest)) shortest = length;
+    }
+    return shortest > 0 ? shortest : isogi_dvr__edge(v, 0);
+}
+
 static isogi_result isogi_dvr__plan_matter(isogi_dvr *d) {
     isogi_dvr__matter *m = &d->matter;
     double step = d->desc.visibility_step > 0 ? d->desc.visibility_step : 2;
@@ -2733,10 +2750,8 @@ static void isogi_dvr__set_lattice(isogi_dvr *d) {
     const double *m = v->axes;
     double determinant = m[0] * (m[4] * m[8] - m[5] * m[7]) + m[1] * (m[5] * m[6] - m[3] * m[8]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
     int r, c;
-    d->spacing = 0;
+    d->spacing = isogi_dvr__shortest_edge(v);
     for (r = 0; r < 3; r++) {
-        double length = isogi_dvr__edge(v, r);
-        if (!r || length < d->spacing) d->spacing = length;
         d->cells[r] = (int)(v->size[r] - 1);
         for (c = 0; c < 3; c++) {
             int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3; /* cyclic: the cofactor has its sign */
@@ -7937,7 +7952,7 @@ ISOGI_API isogi_result isogi_transfer_suggest(const isogi_pyramid *pyramid, isog
     at[0] = range[0], at[5] = range[1];
     for (i = 0; i < 2; i++) at[2 + i] = isogi_dvr__part_way(range[0], range[1], (double)bin[i] / ISOGI_DVR__BINS);
     at[1] = isogi_dvr__part_way(at[0], at[2], 0.7), at[4] = isogi_dvr__part_way(at[3], at[5], 0.15);
-    for (edge = isogi_dvr__edge(v, 0), a = 1; a < 3; a++) edge = isogi_dvr__edge(v, a) < edge ? isogi_dvr__edge(v, a) : edge;
+    edge = isogi_dvr__shortest_edge(v);
     for (a = 0; a < 3; a++) diagonal[a] = (double)v->size[a] * (isogi_dvr__edge(v, a) / edge);
     most = !(width > 0) ? 0 : space == ISOGI_DVR_PHYSICAL ? 0.69 * 30 / sqrt(isogi_dvr__dot(diagonal, diagonal)) : 2 / width;
     for (i = 0; i < ISOGI_SUGGEST_POINTS; i++) {

@@ -452,4 +452,28 @@ TEST(pictures_from_afar_are_those_of_their_rays) {
     isogi_dvr_tets_free(built), field_free(&f);
 }
 
+/* An axis of one voxel has no neighbouring voxels: extinction is per the spacing of the others, whatever its own says. */
+TEST(a_slice_has_the_spacing_of_its_plane) {
+    static float voxel[33 * 33];
+    const isogi_transfer_point point = {0, {1, 1, 1}, 0.01f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const double through = 1 - exp(-0.01 * 64 / 2);
+    for (int i = 0; i < 33 * 33; i++) voxel[i] = 1;
+    for (int k = 0; k < 12; k++) {
+        const double own[4] = {0, 4, 0.01, 1};
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {33, 33, 1}, .spacing = {2, 2, own[k % 4]}};
+        isogi_pyramid *p = NULL;
+        isogi_dvr *dvr = NULL;
+        float pixel[1][4];
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+        const isogi_dvr_desc desc = {.pyramid = p, .opaque = 1, .bound = k / 4 == 1 ? 0.1 : 0, .unit = k / 4 == 2 ? 2 : 0};
+        const isogi_view view = {.width = 1, .height = 1, .fov = 1, .eye = {-40, 32, 0}, .target = {10, 32, 0}};
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK &&
+                  isogi_dvr_render(dvr, &view, NULL, pixel, NULL, NULL) == ISOGI_OK, "render");
+        CHECK(fabs((double)pixel[0][3] - through) < 1e-4, "spacing %g, way %d: %.5f, not %.5f", own[k % 4], k / 4, (double)pixel[0][3],
+              through);
+        isogi_dvr_free(dvr), isogi_vol_free(p);
+    }
+}
+
 TEST_MAIN("dvr_hard")
