@@ -109,7 +109,7 @@
      A hit from within (only through an open border can a ray get there) is a surface too, with its normal turned.
 
    GLSL that lights a surface by an exported irradiance texture (GL_LINEAR, GL_CLAMP_TO_EDGE); grid: voxel coordinates, isogi_vol_to_grid of
-   world ones; lattice_min, lattice_max: those of the description, or 0 and the volume's size - 1 where it has zeros
+   world ones; lattice_min, lattice_max: those of the description, or 0 and the volume's size - 1 where all six are 0
 
        #version 330 core
        uniform sampler3D light;
@@ -149,7 +149,7 @@
    - ISOGI_TRACE_IMPLEMENTATION   implements this one alone
    - ISOGI_NO_THREADS, ISOGI_NO_SIMD, ISOGI_API  as in isogi_vol.h
 
-   Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
+   Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 104 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 10 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
@@ -228,9 +228,9 @@ typedef enum isogi_trace_sides {
     ISOGI_TRACE_BOTH_SIDES /* two textures in one, twice the work: see isogi_trace_high */
 } isogi_trace_sides;
 
-/* Colour that depends on the place, too: called with what the tables say for this isovalue, to change it. point: world.
-   From any thread, at any time; the same arguments must give the same colours. What is beyond 0..1 (albedo) or negative (emission) is
-   clamped, NaN is 0. */
+/* Colour that depends on the place, too: called with what the tables say for this isovalue, to change it. point: world (FEEDBACK also asks
+   for isovalues near by, whose surfaces do not pass there). From any thread, at any time; the same arguments must give the same colours.
+   What is beyond 0..1 (albedo) or negative (emission) is clamped, NaN is 0. */
 typedef void isogi_trace_material_function(void *user, double isovalue, const double point[3], float albedo[3], float emission[3]);
 
 /* How a texel's light is held, and exported. Bytes for a texel of RGB / of a coefficient; error of what was computed, which itself
@@ -299,7 +299,8 @@ typedef struct isogi_trace_desc {
                                           missing, unless lazy: another of these, or none, is then read there */
     int lazy;                  /* non-zero: only texels that were requested (and that the interval, if there is one, reads) */
     int capped;                /* non-zero: the volume's border closes the surface (ISOGI_RAY_CAPPED) */
-    int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured, else 1 */
+    int transfer_channels;     /* TRANSFER: sets of coefficients: 1 = grey (mean albedo), 3 = RGB; 0 = 3 if albedo is coloured or there
+                                  is a material function, else 1 */
     isogi_trace_lookup lookup; /* of request, sample and sample_transfer; the texels themselves do not depend on it */
     isogi_trace_format storage;
     float hierarchy;           /* 0 = a regular lattice. Else two levels: every second texel along each axis first, then all of them only
@@ -307,7 +308,7 @@ typedef struct isogi_trace_desc {
                                   where a texel has no surface. 0.1 to 0.5 is sensible. Saves rays and memory where light varies
                                   slowly (in a cavity two thirds of both at 0.4), but on scans, full of edges, it takes about as
                                   many (make bench, rows lattice-). Not with lazy or a box; such a texture cannot be exported or saved */
-    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the bits of the whole; all 0 = all.
+    size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the bits of the whole; all six 0 = all.
                                   FEEDBACK, unless lazy: these and all others of the cubes that they lie in, see ISOGI_TRACE_CUBE */
 } isogi_trace_desc;
 
@@ -354,9 +355,9 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    TRANSFER: under the lighting last given to isogi_trace_relight or isogi_trace_change (that of the description at first); its error is
    an upper bound, but for textures of order 2 with hundreds of samples: there the spread may be twice as much in open places, as the
    order has no room for the lighting's square.
-   Irradiance below 0 is handed out as it is, here and by isogi_trace_gather: a sky that SH coefficients make negative somewhere brings
-   it, and so do, with TRANSFER, rings of what isogi_trace_lighting calls the least, where nearly all light is hidden. Before it is shown:
-   e = e > 0 ? e : 0  a channel.
+   Irradiance below 0 is handed out as it is, here and by isogi_trace_gather (0 by RGB9E5 and BYTE): a sky that SH coefficients make
+   negative somewhere brings it, and so do, with TRANSFER, rings of what isogi_trace_lighting calls the least, where nearly all light is
+   hidden. Before it is shown: e = e > 0 ? e : 0  a channel.
    Before a block is first shared an error is a bound, of about the light itself; with few samples, filtered, it is two to four times the
    true one. Errors cover the true ones (twice the standard error in 95 % of points, with desc.error in 90 % or more,
    tests/test_trace_bake.c): they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too
@@ -480,7 +481,7 @@ ISOGI_API isogi_result isogi_trace_export_scales(const isogi_trace *trace, int f
    Only desc.isovalue_min, isovalue_max, lazy, lookup, box and the lighting of TRANSFER may differ; else the answer is ISOGI_INVALID
    (lighting, tables and the ranges of the volume's blocks are compared by hash; a material function cannot be. Those whose arrays were
    changed in place are as they were until isogi_trace_change).
-   Any bytes may be loaded: those that are damaged, cut off or of another layout are ISOGI_CORRUPT and change nothing (what is left of a
+   Any bytes may be loaded: those that are damaged, cut off or of another version are ISOGI_CORRUPT and change nothing (what is left of a
    block of both sides that is cut off where the first one ends is a block of that side: ISOGI_INVALID).
    A lazy texture reads of the 4x4x4 around a point, where none of the eight is valid, what points were asked for.
    ISOGI_NO_MEMORY: none of the texels is loaded. isogi_trace_load counts as a writer. Hierarchical textures are not saved: their size is
@@ -3173,8 +3174,9 @@ static int isogi_trace__taps(const isogi_trace *t, const float point[3], isogi_t
             w = isogi_trace__tap(t, cell, local, i, texel);
             if (!(w > 0)) continue;
             state = isogi_trace__state(t, texel);
-            if (state < ISOGI_TRACE__DRAFT) { /* nobody will ask for what lies beyond the box of a bake that is not lazy */
-                pending |= state != ISOGI_TRACE__NO_SURFACE && (state != ISOGI_TRACE__NOT_ASKED || t->scene.desc.lazy);
+            if (state < ISOGI_TRACE__DRAFT) { /* nobody can ask for what lies beyond the box */
+                pending |= state != ISOGI_TRACE__NO_SURFACE &&
+                           (t->scene.desc.lazy ? isogi_trace__in_box(t, texel) : state != ISOGI_TRACE__NOT_ASKED);
                 continue;
             }
         } else if (t->coarse && pending) return isogi_trace__taps(t->coarse, point, r); /* not a cell of the fine level */
