@@ -195,24 +195,29 @@ ISOGI_API void isogi_thread_pool_end(isogi_context *context, isogi_thread_pool *
 /* Numbers in 16 bits (IEEE binary16), for the same: to nearest, ties to even; beyond the range, 65504, the largest finite one; NaN is 0;
    patterns of infinities and NaN are read as the numbers after 65504.
    All in integers, but for what is below 2^-14 on the way back: no denormal float is touched, which would take a hundred times as long. */
-static inline uint16_t isogi_float_to_half(float x) {
-    uint32_t bits, sign, shift, rest;
+static inline uint16_t isogi_float_to_half(float x) { /* masks, not casts, which some have C++ warn of */
+    const uint32_t one = 1;
+    uint32_t bits, sign, shift, rest, half;
     memcpy(&bits, &x, sizeof bits);
     sign = bits >> 16 & 0x8000u, bits &= 0x7fffffffu;
     if (bits > 0x7f800000u) return 0;
-    if (bits >= 0x477fe000u) return (uint16_t)(sign | 0x7bffu);                                          /* 65504 */
-    if (bits < 0x33000000u) return (uint16_t)sign;                                                       /* below 2^-25 */
-    if (bits >= 0x38800000u) return (uint16_t)(sign | ((bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13)); /* from 2^-14: normal */
-    shift = 126 - (bits >> 23), bits = (bits & 0x7fffffu) | 0x800000u; /* denormal: the mantissa with its leading 1, shifted */
-    rest = bits & (((uint32_t)1 << shift) - 1), bits >>= shift;
-    return (uint16_t)(sign | (bits + (rest > (uint32_t)1 << (shift - 1) || (rest == (uint32_t)1 << (shift - 1) && (bits & 1)))));
+    if (bits >= 0x477fe000u) half = 0x7bffu; /* 65504 */
+    else if (bits < 0x33000000u) half = 0;   /* below 2^-25 */
+    else if (bits >= 0x38800000u) half = (bits - 0x38000000u + 0xfffu + (bits >> 13 & 1)) >> 13; /* from 2^-14: normal */
+    else { /* denormal: the mantissa with its leading 1, shifted */
+        shift = 126 - (bits >> 23), bits = (bits & 0x7fffffu) | 0x800000u;
+        rest = bits & ((one << shift) - 1), bits >>= shift;
+        half = bits + (rest > one << (shift - 1) || (rest == one << (shift - 1) && (bits & 1)));
+    }
+    return (sign | half) & 0xffffu;
 }
 
 static inline float isogi_half_to_float(uint16_t half) {
-    uint32_t rest = half & 0x7fffu, bits = (rest << 13) + 0x38000000u;
+    const uint16_t rest = half & 0x7fffu;
+    uint32_t bits = rest * 0x2000u + 0x38000000u;
     float x;
     memcpy(&x, &bits, sizeof x);
-    if (rest < 0x400u) x = (float)rest * (1.0f / 16777216); /* 2^-24 */
+    if (rest < 0x400u) x = rest * (1.0f / 16777216); /* 2^-24 */
     return half & 0x8000u ? -x : x;
 }
 

@@ -105,7 +105,7 @@ matrix() {
             continue
         fi
         for h in $headers; do
-            compile "$cxx-c++11-interface-$h" $cxx "$(cxx_flags c++11) -fsyntax-only -DHEADER='\"$h.h\"'" one.c
+            compile "$cxx-c++11-interface-$h" $cxx "$(cxx_flags c++11) -Wold-style-cast -fsyntax-only -DHEADER='\"$h.h\"'" one.c
             compile "$cxx-c++11-$h" $cxx "$(cxx_flags c++11) -fsyntax-only -DISOGI_IMPLEMENTATION -DHEADER='\"$h.h\"'" one.c
         done
         for std in c++11 c++14 c++17 c++20; do
