@@ -42,6 +42,7 @@
 
      irradiance at surface points    request (if lazy), step until remaining is 0, sample
      keep a window alive             step(trace, rays that fit a frame, &remaining), sample: what is done so far can be shown
+     what was refused (INVALID)      isogi_trace_fault(&desc) names the member at fault
      how good is it                  the error of isogi_trace_sample: standard error of luminance; isogi_trace_status for the whole
      good enough everywhere          desc.error, with desc.samples as the most that a texel may take
      sharper shadows                 a finer lattice (desc.lattice): the border of a hard shadow is up to one and a half texels wide;

@@ -251,7 +251,7 @@ typedef struct isogi_volume {
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a; all 0 = identity; its determinant finite and above
-                            1e-9 of the product of the columns' lengths */
+                            1e-9 of the product of the columns' lengths, and with spacing its inverse finite */
     double scale, bias;  /* scale 0 = 1; up to 1e300, and so is |scale raw| + |bias| for every finite number that the type holds; of
                             ISOGI_F64, for those that are in data */
     /* of a chunk: see above; first up to 2^53, halos up to 2^31-1, without use along an axis of one voxel */
@@ -489,8 +489,8 @@ typedef enum isogi_normal_kind {
     ISOGI_NORMAL_TRILINEAR   /* gradient of the trilinear field: what the ray hit */
 } isogi_normal_kind;
 
-/* World positions of hits; unit normals there, towards lower values, zero where the gradient vanishes but for rounding. For a miss:
-   zeros. */
+/* World positions of hits; unit normals there, towards lower values, zero where the gradient vanishes (the smoothed one: but for
+   rounding). For a miss: zeros. */
 ISOGI_API isogi_result isogi_vol_positions(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, float (*positions)[3]);
 ISOGI_API isogi_result isogi_vol_normals(const isogi_pyramid *pyramid, const isogi_hit *hits, size_t count, isogi_normal_kind kind,
                                          float (*normals)[3]);
@@ -919,7 +919,7 @@ ISOGI_API isogi_thread_pool *isogi_thread_pool_begin(isogi_context *context) {
     (void)context;
 #else
     if (!context || context->thread_pool || context->parallel_for || context->threads == 1) return NULL;
-    if (isogi_thread_pool_create(&pool, context->threads, context) == ISOGI_OK) context->thread_pool = pool;
+    if (isogi_thread_pool_create(&pool, context->threads > 0 ? context->threads : 0, context) == ISOGI_OK) context->thread_pool = pool;
 #endif
     return pool;
 }
@@ -1103,7 +1103,7 @@ static const char *isogi_vol__layout_fault(const isogi_volume *v, size_t type_si
         *code = ISOGI_TOO_LARGE;
         if (v->size[a] > 0x7fffffff) return "size: above 2^31 - 1";
         if (v->halo_low[a] > 0x7fffffff || v->halo_high[a] > 0x7fffffff) return "halo_low, halo_high: above 2^31 - 1";
-        if ((double)v->first[a] > 9007199254740992.0) return "first: above 2^53";
+        if (v->first[a] > 0 && (double)(v->first[a] - 1) >= 9007199254740992.0) return "first: above 2^53";
         if (v->halo_low[a] + v->halo_high[a] > SIZE_MAX / 2 - span) return "size, halo_low, halo_high: too large";
         *code = ISOGI_INVALID;
         span += v->halo_low[a] + v->halo_high[a];
@@ -1115,9 +1115,23 @@ static const char *isogi_vol__layout_fault(const isogi_volume *v, size_t type_si
     return NULL;
 }
 
+/* From steps of the grid to the world and back, for a volume whose defaults are filled in. */
+static void isogi_vol__transforms(const isogi_volume *v, double to_world[9], double to_grid[9]) {
+    const double *m = v->axes, inverse = 1 / isogi_vol__determinant(m);
+    int r, c;
+    for (r = 0; r < 3; r++)
+        for (c = 0; c < 3; c++) {
+            /* cofactor of element (c, r), indices taken cyclically so that the sign comes out right */
+            int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
+            double cofactor = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
+            to_world[3 * r + c] = m[3 * r + c] * v->spacing[c];
+            to_grid[3 * r + c] = cofactor * inverse / v->spacing[r];
+        }
+}
+
 static const char *isogi_vol__geometry_fault(const isogi_volume *volume) {
     static const double largest[6] = {255, 128, 65535, 32768, (double)FLT_MAX, 1};
-    double length = 1, determinant;
+    double length = 1, determinant, to_world[9], to_grid[9];
     isogi_volume v;
     int a;
     for (a = 0; a < 9; a++)
@@ -1133,8 +1147,13 @@ static const char *isogi_vol__geometry_fault(const isogi_volume *volume) {
         if (!(v.spacing[a] > 0)) return "spacing: negative";
         length *= sqrt(x * x + y * y + z * z);
     }
-    determinant = fabs(isogi_vol__determinant(v.axes));
-    return determinant > 1e-9 * length && isogi_vol__finite64(determinant) ? NULL : "axes: (nearly) in one plane, or too long";
+    determinant = isogi_vol__determinant(v.axes);
+    if (!(fabs(determinant) > 1e-9 * length) || !isogi_vol__finite64(determinant)) return "axes: (nearly) in one plane, or too long";
+    isogi_vol__transforms(&v, to_world, to_grid);
+    for (a = 0; a < 9; a++)
+        if (!isogi_vol__finite64(to_world[a]) || !isogi_vol__finite64(to_grid[a]))
+            return "axes, spacing: too small or too large to be inverted";
+    return NULL;
 }
 
 static const char *isogi_vol__fault(const isogi_volume *volume, isogi_result *code) {
@@ -1172,21 +1191,13 @@ static void isogi_vol__transform(const double m[9], const double v[3], double ou
 
 ISOGI_VOL__COLD static void isogi_vol__set_transform(isogi_pyramid *p) {
     const isogi_volume *v = &p->volume;
-    const double *m = v->axes;
-    double inverse = 1 / isogi_vol__determinant(m), first[3];
+    double first[3];
     int r, c;
+    isogi_vol__transforms(v, p->to_world, p->to_grid);
     for (r = 0; r < 3; r++) {
-        for (c = 0; c < 3; c++) {
-            /* cofactor of element (c, r), indices taken cyclically so that the sign comes out right */
-            int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
-            double cofactor = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
-            p->to_world[3 * r + c] = m[3 * r + c] * v->spacing[c];
-            p->to_grid[3 * r + c] = cofactor * inverse / v->spacing[r];
-            p->grid_axis[c][r] = p->to_grid[3 * r + c];
-        }
-        p->box[r] = p->cells[r];
+        for (c = 0; c < 3; c++) p->grid_axis[c][r] = p->to_grid[3 * r + c];
+        p->box[r] = p->cells[r], first[r] = (double)v->first[r];
     }
-    for (r = 0; r < 3; r++) first[r] = (double)v->first[r];
     isogi_vol__transform(p->to_world, first, p->origin);
     for (r = 0; r < 3; r++) p->origin[r] += v->origin[r];
 }
@@ -2826,7 +2837,7 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
 }
 
 /* The same in floats, for eight world points at a time where isogi_vol__plan_float_grid allows it. A first guess of the cell is never too
-   high and at most one too low, as 2^-9 is more than its error; from there the place in the cell is right to 2^-24. */
+   high and at most one too low, as 2^-8 is more than its error; from there the place in the cell is right to 2^-24. */
 ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, const float (*world)[3], int n, isogi_vol__block *b) {
     const isogi_vol__float_grid *g = &p->float_grid;
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
@@ -2843,7 +2854,7 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, con
             points = some;
         }
         k0 = _mm256_loadu_ps(points), k1 = _mm256_loadu_ps(points + 8), k2 = _mm256_loadu_ps(points + 16);
-        /* coordinates r of all points, in lanes of k1 and k2, then in order; a NaN, and what is far below, becomes the least integer */
+        /* coordinates r of all points, in lanes of k1 and k2, then in order; what is far below becomes the least integer */
 #define ISOGI_VOL__AXIS(r, in1, in2)                                                                                             \
     do {                                                                                                                         \
         const __m256 mixed = _mm256_blend_ps(_mm256_blend_ps(k0, k1, in1), k2, in2);                                             \
@@ -2851,7 +2862,7 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, con
                                                                            (7 + r) & 7, (2 + r) & 7, (5 + r) & 7));              \
         const __m256i end = _mm256_set1_epi32(p->cells[r] - 1);                                                                  \
         const __m256 high = _mm256_set1_ps(g->high[r]), at_high = _mm256_set1_ps(g->at_high[r]);                                 \
-        const __m256 guess = _mm256_fmadd_ps(high, w, _mm256_sub_ps(at_high, _mm256_set1_ps(1.0f / 512)));                       \
+        const __m256 guess = _mm256_fmadd_ps(high, w, _mm256_sub_ps(at_high, _mm256_set1_ps(1.0f / 256)));                       \
         __m256i cell = _mm256_cvttps_epi32(_mm256_min_ps(guess, _mm256_cvtepi32_ps(end)));                                       \
         __m256 local, next;                                                                                                      \
         cell = _mm256_max_epi32(cell, _mm256_setzero_si256());                                                                   \
@@ -3481,7 +3492,7 @@ ISOGI_VOL__AVX512 static int isogi_vol__sample16(const isogi_pyramid *p, const f
         const double slope = v->scale * p->to_grid[4 * a];
         if (gradients && !(fabs(slope) > 1e-30 && fabs(slope) < 1e30)) return 0;
         s.high[a] = g->high[a], s.low[a] = g->low[a], s.at_high[a] = g->at_high[a], s.at_low[a] = g->at_low[a];
-        s.at_guess[a] = g->at_high[a] - 1.0f / 512, s.last[a] = (float)(p->cells[a] - 1), s.slope[a] = (float)slope;
+        s.at_guess[a] = g->at_high[a] - 1.0f / 256, s.last[a] = (float)(p->cells[a] - 1), s.slope[a] = (float)slope;
         s.stride[a] = g->stride[a], s.reach += abs(g->stride[a]);
     }
     switch (v->type) {
@@ -3539,9 +3550,9 @@ static int isogi_vol__blockwise(const isogi_pyramid *p, isogi_filter filter) {
     const isogi_volume *v = &p->volume;
     int32_t low[3], high[3];
     if (p->path == ISOGI_VOL__PATH_PLAIN || v->type == ISOGI_F64 || p->field.value) return 0;
-    if (filter == ISOGI_FILTER_LINEAR) return 1;
     /* linear continuation at a corner, and gradients, may take floats of this size beyond their range */
     if (v->type == ISOGI_F32 && !(isogi_vol__largest(p->range[0], p->range[1], v->bias) < 1e36 * fabs(v->scale))) return 0;
+    if (filter == ISOGI_FILTER_LINEAR) return 1;
     isogi_vol__inner_cells(p, low, high);
     return (v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type) && low[0] < high[0] && low[1] < high[1] && low[2] < high[2]);
 }
@@ -7406,12 +7417,11 @@ ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__leave_child(const isogi_vo
                          _mm512_min_ps(isogi_vol__leave16(l, 1, at[1]), isogi_vol__leave16(l, 2, at[2])));
 }
 
-/* Cells of a leaf: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays.
-   */
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE __m512 isogi_vol__mix16(__m512 a, __m512 b, __m512 u) {
     return _mm512_fmadd_ps(u, _mm512_sub_ps(b, a), a);
 }
 
+/* Cells of a leaf: for which rays it is certain that they stay on one side. Like sides8, for one cell and many rays. */
 typedef struct isogi_vol__sides16 { unsigned in, out, in0, out0, in1, out1; } isogi_vol__sides16;
 
 ISOGI_VOL__AVX512 ISOGI_VOL__INLINE void isogi_vol__look16(isogi_vol__sides16 *sides, const __m512 place[3], const __m512 dir[3],
@@ -7763,7 +7773,6 @@ out:
    Rays of a bundle, and any others that follow each other from one place and for one isovalue, come from the root to the leaf in which they
    begin on one way. Its nodes are looked at once for all of them. */
 
-/* slot: of a ray that has been set up. */
 ISOGI_VOL__AVX512 static void isogi_vol__prepare_descent(isogi_vol__descent *d, const isogi_pyramid *p, const double origin[3],
                                                          double isovalue) {
     int low, high, a, n;

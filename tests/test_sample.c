@@ -458,6 +458,54 @@ TEST(places_are_found_alike_on_every_path) {
         }
 }
 
+/* Far along a long axis the first guess of a cell, in floats, is as unsure as it can be: right below its planes it must not be too high. */
+TEST(places_right_below_planes_far_out_are_found) {
+    enum { N = 8192, POINTS = 512 };
+    static float voxel[4 * N], point[POINTS][3], value[POINTS];
+    test_random r = {12};
+    long over = 0;
+    for (int i = 0; i < 4 * N; i++) voxel[i] = (float)(i % N & 1);
+    for (int trial = 0; trial < 200; trial++) {
+        /* the inverse of the spacing half an ulp of floats above one */
+        const double m = (double)(float)(1 + ldexp(1 + random_range(&r, 0, 1), -3 - trial % 9)) - ldexp(0.4995, -23);
+        const double at = -N + ldexp(0.004, -10);
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {N, 2, 2}, .spacing = {1 / m, 1, 1}, .origin = {-at / m, 0, 0}};
+        isogi_context context = {.threads = 1, .force_path = trial % 4};
+        isogi_pyramid *p = NULL;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+        for (int i = 0; i < POINTS; i++)
+            point[i][0] = (float)(v.origin[0] + (8190 - i % 64 - random_range(&r, 0, 0.001)) / m), point[i][1] = point[i][2] = 0.5f;
+        isogi_vol_sample(p, (const float(*)[3])point, POINTS, value, NULL);
+        for (int i = 0; i < POINTS; i++) {
+            const double grid = fmin(fmax(((double)point[i][0] - v.origin[0]) * m, 0), N - 1), cell = fmin(floor(grid), N - 2);
+            const double right = fmod(cell, 2) > 0 ? 1 - (grid - cell) : grid - cell;
+            over += fabs((double)value[i] - right) > ldexp(1, -21);
+        }
+        isogi_vol_free(p);
+    }
+    CHECK(over == 0, "%ld of %d beyond 2^-21", over, 200 * POINTS);
+}
+
+/* Voxels whose difference is beyond floats: the gradient is not, and is the same on every path. */
+TEST(gradients_between_huge_floats_are_numbers) {
+    for (int k = 0; k < 6; k++) {
+        static float voxel[8] = {2e38f, -2e38f, -2e38f, 1e38f, 0, -2e38f, 2e38f, -2e38f};
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {2, 2, 2}, .spacing = {10, 10, 10}, .scale = k & 1 ? 1e-38 : 1};
+        float point[1][3] = {{2, 3, 4}}, value[2][1], gradient[2][1][3];
+        for (int plain = 0; plain < 2; plain++) {
+            isogi_context context = {.threads = 1, .force_path = plain ? 1 : k / 2 + (k > 1)};
+            isogi_pyramid *p = NULL;
+            CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+            isogi_vol_sample(p, (const float(*)[3])point, 1, value[plain], gradient[plain]);
+            isogi_vol_free(p);
+        }
+        for (int a = 0; a < 3; a++)
+            CHECK(fabs((double)gradient[0][0][a] - (double)gradient[1][0][a]) <= 1e-5 * fabs((double)gradient[1][0][a]),
+                  "case %d, axis %d: %g, plainly %g", k, a, (double)gradient[0][0][a], (double)gradient[1][0][a]);
+        CHECK(isfinite(gradient[1][0][0]) && fabs((double)gradient[1][0][0]) > 0, "case %d: %g", k, (double)gradient[1][0][0]);
+    }
+}
+
 TEST(the_size_of_a_call_changes_no_bit) {
     enum { COUNT = 333 };
     static float points[COUNT][3], whole[COUNT], parts[COUNT], whole_gradients[COUNT][3], part_gradients[COUNT][3];

@@ -488,6 +488,12 @@ TEST(bad_volumes_are_refused) {
     REFUSED((v.stride[0] = 3, v.stride[1] = 8, v.stride[2] = 16), ISOGI_INVALID);
     REFUSED(v.scale = (double)NAN, ISOGI_INVALID);
     REFUSED(v.bias = 1e301, ISOGI_INVALID);
+    REFUSED((v.axes[0] = v.axes[4] = v.axes[8] = 1e-105), ISOGI_INVALID); /* their inverse is not finite */
+    REFUSED((v.axes[0] = v.axes[8] = 1e-150, v.axes[4] = 1e-10), ISOGI_INVALID);
+    REFUSED(v.spacing[1] = 1e-310, ISOGI_INVALID);
+#if SIZE_MAX > 0xffffffffu
+    REFUSED(v.first[2] = ((size_t)1 << 53) + 1, ISOGI_TOO_LARGE);
+#endif
 #undef REFUSED
     CHECK(p == (isogi_pyramid *)1, "the output was touched");
 }
@@ -1045,6 +1051,10 @@ TEST(threads_of_a_pool_stay_and_run_every_task_once) {
         isogi_thread_pool_free(context.thread_pool);
         labour_end(l);
     }
+    isogi_context all = {.threads = -1}; /* 0 or less: all cores */
+    isogi_thread_pool *begun = isogi_thread_pool_begin(&all);
+    CHECK(begun && all.thread_pool == begun, "a pool for all cores, %d", all.threads);
+    isogi_thread_pool_end(&all, begun);
     isogi_context few = {.threads = 2}; /* a context's own limit */
     CHECK(isogi_thread_pool_create(&few.thread_pool, 5, NULL) == ISOGI_OK, "pool");
     labour *l = labour_begin(&few);
