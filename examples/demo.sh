@@ -18,8 +18,8 @@ picture() {
 }
 
 if [ "$VOLUME" ]; then
-    name=$(basename "$VOLUME")
-    name=${name%%.*}${ISO:+-$(printf %s "$ISO" | tr -c 0-9A-Za-z.+- _)}
+    name=$(basename -- "$VOLUME")
+    name=${name%.*}${ISO:+-$(printf %s "$ISO" | tr -c 0-9A-Za-z.+- _)}
     set -- "$VOLUME" ${ISO:+--iso "$ISO"} ${SPACING:+--spacing "$SPACING"} ${UP:+--up "$UP"}
     picture "$name-phong" "$name, light by the normal alone" "$@" --mode phong
     [ $failed = 1 ] || picture "$name" "$name, global light" "$@" --mode irradiance

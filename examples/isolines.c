@@ -28,7 +28,8 @@ int main(int argc, char **argv) {
     isogi_result result = procedural_make(shape, 0, &volume, NULL);
     if (result == ISOGI_OK) result = isogi_vol_build(&pyramid, &volume, NULL);
     if (result != ISOGI_OK) return fprintf(stderr, "isolines: %s\n", isogi_result_string(result)), 1;
-    double pixel = (double)(volume.size[0] - 1) / SIDE;
+    const size_t side = volume.size[0] > volume.size[1] ? volume.size[0] : volume.size[1];
+    double pixel = (double)(side - 1) / SIDE;
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0; x < SIDE; x++) {
             points[x][0] = (float)((x + 0.5) * pixel), points[x][1] = (float)((SIDE - y - 0.5) * pixel);

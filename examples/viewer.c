@@ -90,7 +90,8 @@ typedef struct options {
         directions;
     int lookup, shadows, ambient, normals, storage, method, shading, coarsest, local, preset;
     int has_size, has_iso, has_mode, has_spacing, has_albedo, has_preset, has_camera, has_up, has_nan, has_shading, has_shadows,
-        has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification, has_surface;
+        has_ambient, has_gloss, has_step, has_transmission, has_method, has_coarsest, has_silhouette, has_classification, has_surface,
+        has_offset;
     double surface, step, bound, fog, gloss, offset, reach, isovalue, spacing[3], clip[ISOGI_DVR_MAX_PLANES][4], azimuth, elevation,
         distance, up[3], exposure, nan_value;
     float albedo[3];
@@ -259,8 +260,8 @@ static const option option_list[] = {
      "as the order of the texture, which holds exponents up to about 25",
      NUMBERS, VALUE(gloss), 1, 0, 1000, .allowed = "a number, 0 to 1000"},
     {"--normals", "smooth|trilinear", GATHERED, "of the light that is gathered; default smooth", NAMED(normals_name, normals)},
-    {"--offset", "X", GATHERED, "rays of light start this many voxels above the surface, negative: on it; default 0.25", NUMBERS,
-     AT(offset), 0, 1, -1, 1, .allowed = "a number, -1 to 1"},
+    {"--offset", "X", GATHERED, "rays of light start this many voxels above the surface, 0 or negative: on it; default 0.25", NUMBERS,
+     VALUE(offset), 1, -1, 1, .allowed = "a number, -1 to 1"},
     {"--reach", "R", GATHERED, "surfaces further away than this (world units) cast no shadow; default 0 = unlimited", NUMBERS, AT(reach), 0,
      1, 0, 1e9, .allowed = "a number, 0 or more"},
     {"--storage", "NAME", BAKED, "how the texture is held: default, float, half, rgb9e5, byte", NAMED(storage_name, storage)},
@@ -313,7 +314,7 @@ static const option option_list[] = {
      NAMED(transmission_name, transmission), .has = AT(has_transmission)},
     {"--step", "S", VOLUMES,
      "of sampled rays (all of dvr but those of --bound, and by --classification): distance of samples in voxels; "
-     "default 0.5, 1 for dvr without peaks",
+     "default 0.5, 1 for dvr unlit or by visibility, without peaks",
      NUMBERS, VALUE(step), 1, 1e-3, 1e3, .allowed = "a number, 0.001 to 1000"},
     {"--bound", "X", 1 << DVR, "exact opacity, and unlit colours that err by less than this, in place of samples; 0.0001 to 1", NUMBERS,
      AT(bound), 0, 1, 1e-4, 1, .allowed = "a number, 0.0001 to 1"},
@@ -852,6 +853,22 @@ static void point_at(const viewer *v, const float dir[3], double t, float p[3]) 
     for (int i = 0; i < 3; i++) p[i] = (float)(v->view.eye[i] + (double)dir[i] * t);
 }
 
+/* The field in double, as rays see it: a float holds neither 1e300 nor 1e9 + 1e-3. */
+static double value_at(const viewer *v, const double world[3]) {
+    double grid[3], corner[8];
+    int cell[3];
+    isogi_vol_to_grid(v->pyramid, world, grid);
+    for (int a = 0; a < 3; a++) {
+        const double last = (double)(v->volume.size[a] - 1);
+        grid[a] = grid[a] > 0 ? grid[a] < last ? grid[a] : last : 0;
+        cell[a] = grid[a] < last || !(last > 0) ? (int)grid[a] : (int)last - 1, grid[a] -= cell[a];
+    }
+    isogi_vol_corners(v->pyramid, cell, corner);
+    for (int a = 0, n = 4; a < 3; a++, n /= 2)
+        for (int k = 0; k < n; k++) corner[k] = (1 - grid[a]) * corner[2 * k] + grid[a] * corner[2 * k + 1];
+    return corner[0];
+}
+
 static void view_row(void *arg, size_t row) {
     view_job *job = (view_job *)arg;
     viewer *v = job->v;
@@ -862,8 +879,7 @@ static void view_row(void *arg, size_t row) {
         int n = width - x0 < 64 ? width - x0 : 64;
         isogi_ray rays[64];
         isogi_hit hits[64];
-        float entry[64][3], value[64];
-        double from[64];
+        double from[64], value[64];
         memset(rays, 0, sizeof rays);
         for (int i = 0; i < n; i++) {
             isogi_ray *r = &rays[i];
@@ -871,18 +887,21 @@ static void view_row(void *arg, size_t row) {
             sample_ray(job, x0 + i, (int)row, r->dir);
             memcpy(r->origin, v->view.eye, sizeof r->origin);
             from[i] = -1, r->tmin = 1, r->tmax = 0.5, r->isovalue = v->isovalue; /* an empty range: a miss */
-            point_at(v, r->dir, 0, entry[i]);
             if (!visible_range(job, r->dir, &from[i], &to)) from[i] = -1;
-            else r->tmin = from[i], r->tmax = to, point_at(v, r->dir, from[i], entry[i]);
+            else {
+                double entry[3];
+                r->tmin = from[i], r->tmax = to;
+                for (int a = 0; a < 3; a++) entry[a] = v->view.eye[a] + (double)r->dir[a] * from[i];
+                value[i] = value_at(v, entry);
+            }
         }
-        isogi_vol_sample(v->pyramid, (const float(*)[3])entry, (size_t)n, value, NULL);
         if (job->trace) isogi_vol_intersect(v->pyramid, rays, (size_t)n, hits, &job->row_counters[row]);
         for (int i = 0; i < n; i++) {
             if (job->trace) {
                 inverse[x0 + i] = hits[i].side ? (float)(1 / hits[i].t) : 0;
                 seen[x0 + i] = hits[i].side ? 0 : RASTER_NONE;
             }
-            if (from[i] > job->near_plane && (double)value[i] >= v->isovalue)
+            if (from[i] > job->near_plane && value[i] >= v->isovalue)
                 inverse[x0 + i] = (float)(1 / from[i]), seen[x0 + i] = SECTION;
         }
     }
@@ -963,8 +982,9 @@ static isogi_trace_desc describe_trace(const viewer *v) {
     isogi_trace_desc desc = {.pyramid = v->pyramid, .lighting = v->lighting, .bounces = v->o.mode == VICINITY ? 0 : v->o.bounces,
                              .samples = v->o.samples, .lazy = 1};
     desc.lookup = (isogi_trace_lookup)v->o.lookup, desc.normals = (isogi_normal_kind)v->o.normals; /* names in the order of the enums */
-    desc.storage = (isogi_trace_format)v->o.storage, desc.offset = (float)v->o.offset, desc.reach = (float)v->o.reach,
-    desc.no_shadows = !v->o.shadows;
+    desc.storage = (isogi_trace_format)v->o.storage, desc.offset = (float)v->o.offset, desc.no_shadows = !v->o.shadows;
+    if (v->o.has_offset && !(desc.offset > 0)) desc.offset = -1; /* on the surface; 0 would be the default */
+    desc.reach = v->o.reach > 0 && v->o.reach < 1e-30 ? 1e-30f : (float)v->o.reach; /* 0 would be unlimited */
     desc.mode = v->o.mode == TRANSFER ? ISOGI_TRACE_TRANSFER : ISOGI_TRACE_IRRADIANCE;
     if (v->o.mode == TRANSFER) memset(&desc.lighting, 0, sizeof desc.lighting);
     memcpy(desc.albedo, v->albedo, sizeof desc.albedo);
@@ -1174,11 +1194,10 @@ static void phong(const viewer *v, const float point[3], const double n[3], cons
 
 /* Where matter is cut, its inside has no light of its own: it shows the data, from the isovalue up, under unshadowed light. */
 static void section_colour(const viewer *v, const float point[3], float rgb[3]) {
+    const double world[3] = {(double)point[0], (double)point[1], (double)point[2]};
     double n[3], light[3], top = v->range[1] - v->isovalue, s;
-    float value;
     section_normal(v, point, n);
-    isogi_vol_sample(v->pyramid, (const float(*)[3])(const void *)point, 1, &value, NULL);
-    s = top > 0 ? ((double)value - v->isovalue) / top : 1;
+    s = top > 0 ? (value_at(v, world) - v->isovalue) / top : 1;
     s = s > 0 ? (s < 1 ? s : 1) : 0;
     if (v->o.mode == VICINITY) light[0] = light[1] = light[2] = PI;
     else lambert(v, point, n, 1, 0, light);

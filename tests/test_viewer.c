@@ -1313,6 +1313,29 @@ TEST(fog_lies_over_sections_too) {
           difference);
 }
 
+/* Where the box cuts matter its section is seen in the right places whatever the unit of values is, also where floats do not hold it. */
+TEST(sections_do_not_depend_on_the_unit) {
+    static const double scale[] = {1, 1e300, 1e39, 1e-46, 1e-300, 0.001}, shift[] = {0, 0, 0, 0, 0, 1e9};
+    double value[7 * 7 * 7];
+    char command[1024], unit[256];
+    strcpy(unit, temporary("unit.png"));
+    for (int k = 0; k < 6; k++) {
+        double difference = k ? 1 : 0;
+        for (int i = 0; i < 343; i++) {
+            const double x = i % 7 - 3.0, y = i / 7 % 7 - 3.0, z = i / 49 - 3.0; /* a ball that the sides of the box cut */
+            value[i] = scale[k] * (3.7 - sqrt(x * x + y * y + z * z)) / 8 + shift[k];
+        }
+        const char *path = temporary("ball_7x7x7_float64.raw");
+        write_bytes(path, value, sizeof value);
+        snprintf(command, sizeof command, "'%s' --mode lambert --iso %.17g --exposure 1 --size 64x64 %s%s%s --out '%s'", path, shift[k],
+                 k ? "--compare '" : "", k ? unit : "", k ? "'" : "", k ? temporary("other.png") : unit);
+        const run_result r = run_viewer(command);
+        CHECK(r.status == 0, "%d: %s", r.status, r.error);
+        CHECK((!k || sscanf(r.output, "difference_rms %lf", &difference) == 1) && difference < 0.005, "%g f + %g: %g", scale[k], shift[k],
+              difference);
+    }
+}
+
 /* A picture made with options, then the same compared with it. */
 static run_result compared_with(const char *options, const char *then) {
     const char *first = temporary("first.png");
