@@ -623,8 +623,6 @@ typedef int32_t isogi_dvr__ints __attribute__((vector_size(64), aligned(4), may_
 #define ISOGI_DVR__V(p) (*(isogi_dvr__floats *)(void *)(p))
 #define ISOGI_DVR__C(p) (*(const isogi_dvr__floats *)(const void *)(p))
 typedef float isogi_dvr__four __attribute__((vector_size(16), aligned(4), may_alias)); /* a colour and something */
-typedef int32_t isogi_dvr__four_ints __attribute__((vector_size(16), aligned(4), may_alias));
-#define ISOGI_DVR__C4I(p) (*(const isogi_dvr__four_ints *)(const void *)(p))
 #define ISOGI_DVR__4(p) (*(isogi_dvr__four *)(void *)(p))
 #define ISOGI_DVR__C4(p) (*(const isogi_dvr__four *)(const void *)(p))
 #if defined(__x86_64__)
@@ -1522,7 +1520,7 @@ static double isogi_dvr__bounded_limit(const isogi_dvr__transfer *t, double boun
 /* Nothing in a range of values counts for anything. */
 static int isogi_dvr__range_empty(const isogi_dvr *d, const float range[2]) {
     double quiet[2] = {1, 0};
-    if (range[0] > range[1]) return 1;
+    if (range[0] > range[1] || !(d->transfer.point_count || d->transfer.peak_count)) return 1;
     if (isogi_dvr__bounded(d)) return isogi_dvr__is_quiet(&d->integral, (double)range[0], (double)range[1], quiet);
     if (!isogi_dvr__by_value(d)) return !(isogi_dvr__most(&d->transfer, (double)range[0], (double)range[1]) > 0);
     return !(range[0] < range[1]) || isogi_dvr__is_quiet(&d->integral, (double)range[0], (double)range[1], quiet);
@@ -2111,8 +2109,6 @@ static void isogi_dvr__local(const isogi_dvr__local_rays *a, float *clear) {
 #define ISOGI_DVR__MORE                                                                  \
     ((w[0] * ISOGI_DVR__C(r0 + i) + w[1] * ISOGI_DVR__C(r0 + i + 1)) +                   \
      (w[2] * ISOGI_DVR__C(r0 + a->beside + i) + w[3] * ISOGI_DVR__C(r0 + a->beside + i + 1)))
-/* The blocks of level 0 that samples lie in, along an axis; where they leave the empty ones around. */
-#define ISOGI_DVR__VI(p) (*(isogi_dvr__ints *)(void *)(p))
 #define ISOGI_DVR__CI(p) (*(const isogi_dvr__ints *)(const void *)(p))
 #define ISOGI_DVR__KERNELS(SUFFIX, TARGET)                                                                                          \
     TARGET static void isogi_dvr__pass##SUFFIX(const isogi_dvr__rows *a, const float weight[4]) {                                  \
@@ -2287,7 +2283,6 @@ ISOGI_DVR__AVX512 int isogi_dvr__leap_avx512(const isogi_dvr *d, isogi_dvr__pack
 #undef ISOGI_DVR__KERNELS
 #undef ISOGI_DVR__MORE
 #undef ISOGI_DVR__LESS
-#undef ISOGI_DVR__VI
 #undef ISOGI_DVR__CI
 #undef ISOGI_DVR__EXP
 #endif
@@ -2389,9 +2384,10 @@ static void isogi_dvr__read_row(const isogi_volume *v, double low, size_t first,
    their common face (edge, corner) take what the coarsest of them has there, between its nodes too: both sides then interpolate the
    same function, and there is no seam. Blocks are therefore finished from coarse to fine. */
 
-/* Averages of the data on coarser lattices: nodes 2^step voxels apart, over the blocks' whole extent; each is the last one halved
-   with weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value. What is not
-   finite is left out; where nothing else is, a node is not finite either, and transparent. */
+/* Averages of the data on coarser lattices: nodes 2^step voxels apart, over the blocks' whole extent; each is the last one halved with
+   weights 1/4, 1/2, 1/4, which keeps linear fields. At the border the field goes on by reflection in its last value where a block ends
+   with the volume, else by repeating it. What is not finite is left out; where nothing else is, a node is not finite either, and
+   transparent. */
 static size_t isogi_dvr__lattice_index(const isogi_dvr__blocks *b, int step, const size_t c[3]) {
     const size_t *size = b->lattice_size[step];
     return c[0] + size[0] * (c[1] + size[1] * c[2]);
@@ -3836,6 +3832,7 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
         if (c && c >= last) c = last - 1;
         u = (float)(x - (double)c), next = row[c + (last > 0) - first];
         value = row[c - first] + u * (next - row[c - first]);
+        if (!isogi_dvr__finite32(value)) value = u > 0 ? u < 1 ? value : next : row[c - first]; /* a neighbour without weight */
         if (!isogi_dvr__finite32(value)) continue;
         value = (value - low) * scale;
         value = value > 0 ? value : 0;
@@ -4177,7 +4174,7 @@ static float isogi_dvr__block_value(const isogi_dvr *d, size_t block, const doub
     float w[8], sum = 0;
     if (!n) return (float)(d->range[0] - d->base);
     base = b->first[block] + isogi_dvr__place(b, block, n, position, corner, w);
-    for (k = 0; k < 8; k++) /* a node of no weight may be another thread's at work */
+    for (k = 0; k < 8; k++) /* a node of no weight may not be finite */
         if (w[k] > 0) sum += w[k] * b->data[base + corner[k]];
     return sum;
 }
@@ -4558,7 +4555,7 @@ static void isogi_dvr__local_at(const isogi_dvr *d, size_t block, const double p
     base = b->sh + (b->first[b->total + block] + isogi_dvr__place(b, block, n, position, corner, w)) * d->coefficients;
     for (k = 0; k < 8; k++) {
         const uint16_t *v = base + corner[k] * d->coefficients;
-        if (!(w[k] > 0)) continue;
+        if (!(w[k] > 0)) continue; /* a node of no weight may be another thread's at work */
         for (c = 0; c < d->coefficients; c++) out[c] += w[k] * isogi_half_to_float(v[c]);
     }
 }
@@ -4656,6 +4653,12 @@ static float isogi_dvr__global_piece(const isogi_dvr__blocks *b, const float *to
     return v[0] > 0 ? v[0] < 1 ? v[0] : 1 : 0;
 }
 
+/* Where point i of the visibility grid stands along an axis: the last one on the border to the bit, as what is beyond counts from there. */
+static double isogi_dvr__grid_place(const isogi_dvr *d, int axis, double apart, size_t i) {
+    const size_t points = d->desc.grid[axis];
+    return points < 2 ? 0.5 * d->cells[axis] : i + 1 < points ? (double)i * apart : d->cells[axis];
+}
+
 /* Piecewise integration: local visibility stands for the ray's next r_s voxels; the last piece, cut by the border, is no shorter in
    what it blocks since there is nothing outside (eq. 9). A row of grid points at once: it shares places along y and z. */
 static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const double from[3], double apart, size_t count,
@@ -4673,7 +4676,7 @@ static void isogi_dvr__global_row(const isogi_dvr *d, const float *toward, const
         isogi_dvr__global_at(&d->blocks, 1, from[1] + t * direction[1], &y),
             isogi_dvr__global_at(&d->blocks, 2, from[2] + t * direction[2], &z);
         for (i = 0, left = 0; i < count; i++) {
-            double x = from[0] + (double)i * apart;
+            double x = isogi_dvr__grid_place(d, 0, apart, i);
             if (!(clear[i] > (float)ISOGI_DVR__NEGLIGIBLE) ||
                 (fabs(across) > 0 && !(t < ((across > 0 ? d->cells[0] : 0) - x) * across))) continue;
             clear[i] *= isogi_dvr__global_piece(&d->blocks, toward, x + t * direction[0], &y, &z), left++;
@@ -4686,15 +4689,12 @@ static void isogi_dvr__global_task(void *arg, size_t task) {
     const isogi_dvr__batch *job = (const isogi_dvr__batch *)arg;
     const isogi_dvr *d = job->dvr;
     size_t k = task % job->count, z = task / job->count, y;
-    double first[3], apart[3];
+    double apart[3];
     int a;
-    for (a = 0; a < 3; a++) {
-        size_t points = d->desc.grid[a];
-        apart[a] = points > 1 ? d->cells[a] / (double)(points - 1) : 0, first[a] = points > 1 ? 0 : 0.5 * d->cells[a];
-    }
+    for (a = 0; a < 3; a++) apart[a] = d->desc.grid[a] > 1 ? d->cells[a] / (double)(d->desc.grid[a] - 1) : 0;
     for (y = 0; y < d->desc.grid[1]; y++) {
         double from[3];
-        from[0] = first[0], from[1] = first[1] + (double)y * apart[1], from[2] = first[2] + (double)z * apart[2];
+        from[0] = 0, from[1] = isogi_dvr__grid_place(d, 1, apart[1], y), from[2] = isogi_dvr__grid_place(d, 2, apart[2], z);
         isogi_dvr__global_row(d, job->scratch_count ? job->scratch + k * job->scratch_count : NULL, from, apart[0], d->desc.grid[0],
                               d->direction[job->first + k],
                               job->transmittance + k * d->padded_count + d->desc.grid[0] * (y + d->desc.grid[1] * z));
@@ -5980,7 +5980,9 @@ static void isogi_dvr__divide_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s)
 
 static void isogi_dvr__composite_piece(isogi_dvr__pixel_ray *r, isogi_dvr__span *s) {
     double x = s->piece.value[0], y = s->piece.value[1];
-    if (isogi_dvr__is_quiet(&r->dvr->integral, x < y ? x : y, x < y ? y : x, s->walk.quiet)) return;
+    /* along an isosurface silhouettes count, also of the value that a block just passed had throughout, which `quiet` may be */
+    if ((x < y || y < x || s->silhouette == ISOGI_DVR_SILHOUETTE_NONE) &&
+        isogi_dvr__is_quiet(&r->dvr->integral, x < y ? x : y, x < y ? y : x, s->walk.quiet)) return;
     s->lit = 0, s->factor = isogi_dvr__span_factor(s);
     s->unlit[0] = s->unlit[1] = s->unlit[2] = s->depth = s->absorbing = 0;
     isogi_dvr__divide_piece(r, s);
@@ -7730,7 +7732,9 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->light = (float(*)[4])isogi_allocate(&d->context, points + 1, sizeof *f->light); /* one more, for a grid of one point along x */
     if (!f->light) return ISOGI_NO_MEMORY;
     memset(f->light[points], 0, sizeof *f->light);
-    scale = 1.5 * 1.7321 * d->distance[1] * d->spacing * f->per_unit; /* no reach is larger, whatever the axes */
+    scale = 1.5 * 1.7321 * d->distance[1] * d->spacing * f->per_unit; /* no reach is larger, whatever the axes, */
+    for (a = 0; a < 3; a++)
+        if (d->desc.grid[a] < 2) scale = 1e30; /* but along one with a single point, where it has no end */
     if (isogi_dvr__by_openness(1, isogi_dvr__stand_off(1, scale * isogi_dvr__most(&d->transfer, d->range[0], d->range[1]))) > 0) {
         f->open = (float(*)[4])isogi_allocate(&d->context, points + 1, sizeof *f->open);
         if (!f->open) return ISOGI_NO_MEMORY;
@@ -8615,7 +8619,6 @@ ISOGI_API isogi_result isogi_dvr_tets_render(const isogi_tets *tets, const isogi
 #undef ISOGI_DVR__C
 #undef ISOGI_DVR__4
 #undef ISOGI_DVR__C4
-#undef ISOGI_DVR__C4I
 #undef ISOGI_DVR__COUNTS
 #undef ISOGI_DVR__MOST_DEPTH
 #undef ISOGI_DVR__SOFT

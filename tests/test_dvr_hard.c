@@ -452,6 +452,156 @@ TEST(pictures_from_afar_are_those_of_their_rays) {
     isogi_dvr_tets_free(built), field_free(&f);
 }
 
+/* ---- grids at their ends ---- */
+
+/* A renderer of fog by visibility, finished. */
+static isogi_dvr *fog_new(const isogi_pyramid *p, float extinction, const isogi_dvr_desc *given) {
+    const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, extinction}};
+    const isogi_transfer transfer = {points, 2, NULL, 0};
+    isogi_dvr_desc desc = *given;
+    isogi_dvr *dvr = NULL;
+    desc.pyramid = p, desc.shading = ISOGI_DVR_VISIBILITY;
+    CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK &&
+              isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "fog of %g", (double)extinction);
+    return dvr;
+}
+
+static double openness(const isogi_dvr *dvr, double x, double y, double z) {
+    const float point[1][3] = {{(float)x, (float)y, (float)z}};
+    float v[36] = {0};
+    isogi_dvr_sample_visibility(dvr, point, 1, v);
+    return (double)v[0];
+}
+
+/* Along an axis with a single grid point visibility reaches to the ends: pictures by classes are those that sample. */
+TEST(a_grid_of_one_point_along_an_axis) {
+    enum { N = 48, SIDE = 24 };
+    static float voxel[N * N * N], pixel[2][SIDE * SIDE][4];
+    const isogi_light sun = {.vector = {0, 0, 1}, .rgb = {10, 10, 10}};
+    const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+    const isogi_view view = {.width = SIDE, .height = SIDE, .eye = {-450, 23.7f, 23.7f}, .target = {0, 23.7f, 23.7f}, .fov = 6};
+    isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {N, N, N}};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < N * N * N; i++) voxel[i] = i ? 1 : 0.999f;
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 4; k++) {
+        double most = 0;
+        for (int way = 0; way < 2; way++) {
+            const isogi_dvr_desc desc = {.directions = 64, .grid = {1, 9, 9}, .opaque = 1, .step = 0.1,
+                                         .classification = way ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            isogi_dvr *dvr = fog_new(p, 0.14f + 0.03f * (float)k, &desc);
+            isogi_dvr_render(dvr, &view, &lighting, pixel[way], NULL, NULL);
+            isogi_dvr_free(dvr);
+        }
+        for (int i = 0; i < SIDE * SIDE; i++) most = fmax(most, fabs((double)pixel[0][i][0] - (double)pixel[1][i][0]));
+        CHECK(most < 0.15, "extinction %g: pixels differ by up to %.3f", 0.14 + 0.03 * k, most);
+    }
+    isogi_vol_free(p);
+}
+
+/* The paper's method: what stands on the upper faces is as open as what stands on the lower ones, for all numbers of voxels. */
+TEST(upper_faces_are_as_open_as_lower_ones) {
+    for (int k = 0; k < 9; k++) {
+        const int axis = k % 3;
+        size_t size[3] = {17, 17, 17};
+        size[axis] = k < 3 ? 108 : k < 6 ? 119 : 124;
+        const size_t count = size[0] * size[1] * size[2];
+        float *voxel = (float *)malloc(count * sizeof *voxel);
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {size[0], size[1], size[2]}};
+        isogi_pyramid *p = NULL;
+        for (size_t i = 0; i < count; i++) voxel[i] = i ? 1 : 0.999f;
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+        const isogi_dvr_desc desc = {.method = ISOGI_DVR_PAPER, .sphere = ISOGI_DVR_OCTAHEDRON, .directions = 32, .order = 2,
+                                     .reduction = 1};
+        isogi_dvr *dvr = fog_new(p, 0.05f, &desc);
+        double at[2][3] = {{8, 8, 8}, {8, 8, 8}};
+        at[0][axis] = 0, at[1][axis] = (double)size[axis] - 1;
+        const double low = openness(dvr, at[0][0], at[0][1], at[0][2]), high = openness(dvr, at[1][0], at[1][1], at[1][2]);
+        CHECK(low > 1 && fabs(high - low) < 0.02 * low, "%d voxels along axis %d: %.4f below, %.4f above", (int)size[axis], axis, low,
+              high);
+        isogi_dvr_free(dvr), isogi_vol_free(p), free(voxel);
+    }
+}
+
+/* Sweeps: a wall beside a layer of NaN throws the shadow that it throws on the other side of one, along every axis. */
+TEST(walls_beside_what_is_not_finite_keep_their_shadows) {
+    double first = 0;
+    for (int k = 0; k < 6; k++) {
+        static float voxel[17 * 17 * 17];
+        const int axis = k / 2, gap = 8 + (k % 2 ? 1 : -1);
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {17, 17, 17}};
+        isogi_pyramid *p = NULL;
+        for (int i = 0; i < 17 * 17 * 17; i++) {
+            const int c[3] = {i % 17, i / 17 % 17, i / 289};
+            voxel[i] = c[axis] == gap ? NAN : c[axis] == 8 ? 1 : 0;
+        }
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+        const isogi_dvr_desc desc = {.sphere = ISOGI_DVR_OCTAHEDRON, .directions = 128, .order = 1, .visibility_step = 1,
+                                     .grid = {17, 17, 17}};
+        isogi_dvr *dvr = fog_new(p, 2, &desc);
+        double at[3] = {8, 8, 8};
+        at[axis] = k % 2 ? 2 : 14; /* the wall lies between */
+        const double open = openness(dvr, at[0], at[1], at[2]);
+        if (!k) first = open;
+        CHECK(open < 3 && fabs(open - first) < 0.01, "axis %d, NaN at %d: %.4f, not %.4f", axis, gap, open, first);
+        isogi_dvr_free(dvr), isogi_vol_free(p);
+    }
+}
+
+/* An isosurface seen edge on behind a block that has its value throughout is seen as it is from a hair beside it. (Not by the approximate
+   silhouettes, which weight the opacity of a piece: one of a single value has none.) */
+TEST(silhouettes_behind_a_block_of_one_value) {
+    static float voxel[9 * 9 * 33];
+    const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, 1}};
+    const isogi_transfer transfer = {points, 2, NULL, 0};
+    isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {33, 9, 9}};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < 9 * 9 * 33; i++) voxel[i] = 0.5f + (i % 33 > 8 ? 0.05f * (float)(i / 33 % 9 - 4) : 0);
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int k = ISOGI_DVR_SILHOUETTE_NONE; k <= ISOGI_DVR_SILHOUETTE_GRADIENT; k++) {
+        const isogi_dvr_desc desc = {.pyramid = p, .space = ISOGI_DVR_DATA, .silhouette = (isogi_dvr_silhouette)k};
+        isogi_dvr *dvr = NULL;
+        float pixel[2][4];
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK, "create");
+        for (int i = 0; i < 2; i++) {
+            const float y = i ? 4.0001f : 4;
+            const isogi_view view = {.width = 1, .height = 1, .eye = {-5, y, 4.3f}, .target = {40, y, 4.3f}, .fov = 1};
+            isogi_dvr_render(dvr, &view, NULL, pixel + i, NULL, NULL);
+        }
+        if (k == ISOGI_DVR_SILHOUETTE_APPROXIMATE) pixel[1][3] = 0;
+        CHECK(fabs((double)pixel[0][3] - (double)pixel[1][3]) < 1e-3, "silhouette %d: %.6f, beside it %.6f", k, (double)pixel[0][3],
+              (double)pixel[1][3]);
+        CHECK(k != ISOGI_DVR_SILHOUETTE_EXACT || pixel[0][3] > 0.3f, "opacity %g", (double)pixel[0][3]);
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(p);
+}
+
+/* Before a transfer function is set nothing is there: no ray is needed to know. */
+TEST(without_a_transfer_function_nothing_costs_rays) {
+    static float voxel[32 * 32 * 32], pixel[64 * 64][4];
+    const isogi_view view = {.width = 64, .height = 64, .eye = {15, 15, 100}, .target = {15, 15, 15}};
+    const isogi_lighting dark = {.light_count = 0};
+    isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {32, 32, 32}};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < 32 * 32 * 32; i++) voxel[i] = 0.01f * (float)(i % 32) + 0.02f * (float)(i / 32 % 32);
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 3; k++) {
+        const isogi_dvr_desc desc = {.pyramid = p, .shading = ISOGI_DVR_VISIBILITY, .directions = 16,
+                                     .space = k == 1 ? ISOGI_DVR_DATA : ISOGI_DVR_PHYSICAL, .bound = k == 2 ? 0.1 : 0,
+                                     .method = k == 2 ? ISOGI_DVR_PAPER : ISOGI_DVR_BRUTE};
+        isogi_dvr *dvr = NULL;
+        isogi_counters step = {0}, picture = {0};
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "create");
+        isogi_dvr_counters(dvr, &step);
+        CHECK(isogi_dvr_render(dvr, &view, &dark, pixel, NULL, &picture) == ISOGI_OK && step.rays == 0 && picture.cells == 0 &&
+                  picture.samples == 0,
+              "way %d: %d rays, %d cells, %d samples", k, (int)step.rays, (int)picture.cells, (int)picture.samples);
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(p);
+}
+
 /* An axis of one voxel has no neighbouring voxels: extinction is per the spacing of the others, whatever its own says. */
 TEST(a_slice_has_the_spacing_of_its_plane) {
     static float voxel[33 * 33];
