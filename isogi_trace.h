@@ -432,7 +432,7 @@ typedef struct isogi_trace_report {
     uint64_t drafts;  /* of which so many will get more samples */
     uint64_t probes;  /* FEEDBACK: other points whose light was gathered because rays met the surface there */
     double light;     /* IRRADIANCE: root mean square of luminance over these texels, */
-    double error;     /* of their standard errors (TRANSFER: under a uniform sky of radiance 1; without what is not known) */
+    double error;     /* of their standard errors, without what is not known (TRANSFER: under a uniform sky of radiance 1) */
     double worst;     /* the largest of these errors; INFINITY where one is not known */
     double unit;      /* IRRADIANCE: light that an open texel gets, averaged over orientations: what desc.error is a fraction of. Measured
                          at the volume's middle, but at least a quarter of its diagonal from a lamp, and before a rectangle. Where
@@ -1411,7 +1411,7 @@ typedef struct isogi_trace__site {
     float geometric[3]; /* then: the trilinear normal; directions below it are mirrored, as at every later vertex */
     signed char from; /* FEEDBACK: side of the surface, 1 low, -1 high */
     int open;         /* the origin lies beyond an open border: what a ray meets first may be a surface seen from within */
-    uint64_t key;
+    uint64_t key; /* PATHS: of its random numbers */
 } isogi_trace__site;
 
 /* The size of the smallest cells. Where lights throw shadows a probe near an edge has the light of either side, for all hits of its cell:
@@ -1488,9 +1488,9 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, const float
 
 /* Grid coordinates of the first place `offset` voxels along the normal, twice or four times as far (up to one voxel) that is on the
    right side of the trilinear surface, which has bumps that the smoothed normal does not know of (Wyman 2006, 4.1.1). Beyond a border
-   is air where the border is capped, else whatever was asked for. 0: there is none. */
-static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi_trace__site *site, double offset, double grid[3],
-                                    int *beyond) {
+   is air where the border is capped, else whatever was asked for. high: the right side is the high one. 0: there is none. */
+static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi_trace__site *site, int high, double offset,
+                                    double grid[3], int *beyond) {
     const double *m = scene->to_grid;
     double n[3], speed = 0;
     int a, attempt;
@@ -1508,20 +1508,21 @@ static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi
             grid[a] = site->place.cell[a] + site->place.local[a] + n[a] * (offset / speed);
             *beyond |= grid[a] < 0 || grid[a] > (double)(scene->volume->size[a] - 1);
         }
-        if (*beyond && scene->high && scene->desc.capped) continue;
+        if (*beyond && high && scene->desc.capped) continue;
         isogi_trace__locate(scene->volume, grid, &place);
-        if (*beyond || (isogi_trace__value(scene->volume, &place) < site->isovalue) != scene->high) return 1;
+        if (*beyond || (isogi_trace__value(scene->volume, &place) < site->isovalue) != high) return 1;
     }
     return 0;
 }
 
-/* Rays start off the surface; where that is in matter wherever it was tried, on the surface itself. */
-static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site) {
+/* Rays start off the surface; where that is on its other side wherever it was tried, on the surface itself. high: they are on the high
+   side, as all are of a bake of that side, and probes on surfaces seen from within. */
+static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace__site *site, int high) {
     double grid[3];
     int a, beyond, plane;
     site->on_surface = 1, site->open = 0;
     isogi_trace__to_world(scene->pyramid, &site->place, site->point);
-    if (isogi_trace__off_surface(scene, site, (double)scene->desc.offset, grid, &beyond)) {
+    if (isogi_trace__off_surface(scene, site, high, (double)scene->desc.offset, grid, &beyond)) {
         isogi_vol_to_world(scene->pyramid, grid, site->origin);
         site->on_surface = 0, site->open = beyond && !scene->desc.capped;
         return;
@@ -1529,7 +1530,7 @@ static void isogi_trace__site_start(const isogi_trace__scene *scene, isogi_trace
     memcpy(site->origin, site->point, sizeof site->origin);
     if (site->place.side != 2 && site->place.side != -2) site->place.side = 1; /* a probe on a cap is no place of the isosurface */
     isogi_vol_normals(scene->pyramid, &site->place, 1, ISOGI_NORMAL_TRILINEAR, &site->geometric);
-    for (a = 0; a < 3 && scene->high; a++) site->geometric[a] = -site->geometric[a];
+    for (a = 0; a < 3 && high; a++) site->geometric[a] = -site->geometric[a];
     if (isogi_trace__dot(site->geometric, site->normal) > 0) return;
     /* As at hits: a smoothed normal that points the other way would send rays through matter. But where cells meet, as on caps, the
        gradient is that of one of them alone; isogi_trace__hold stops what goes into matter there. */
@@ -1881,8 +1882,8 @@ static void isogi_trace__wave_run(isogi_trace__wave *w, int first, int count) {
 
 /* ==== the light at a site ============================================================================================ */
 
-/* Irradiance by lights without extent, which one ray decides. */
-static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isogi_trace__site *site, double rgb[3],
+/* Irradiance by lights without extent, which one ray decides. side: that of the surface on which the site is. */
+static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isogi_trace__site *site, int side, double rgb[3],
                                      isogi_counters *counters) {
     const isogi_lighting *lighting = &scene->desc.lighting;
     size_t l;
@@ -1895,7 +1896,7 @@ static void isogi_trace__site_lights(const isogi_trace__scene *scene, const isog
         if (!isogi_trace__light_beam(&lighting->lights[l], site->point, 0, 0, &beam) || !isogi_trace__site_beam(site, &beam)) continue;
         beam.tmax = isogi_trace__within(&scene->desc, site->point, site->origin, beam.dir, beam.tmax), hit.side = 0;
         if (!scene->desc.no_shadows)
-            isogi_trace__site_rays(scene, site, scene->high ? -1 : 1, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
+            isogi_trace__site_rays(scene, site, side, (const float(*)[3]) & beam.dir, &beam.tmax, 1, &ray, &hit, counters);
         for (c = 0; c < 3 && !hit.side; c++) rgb[c] += beam.rgb[c];
     }
 }
@@ -1958,7 +1959,7 @@ static void isogi_trace__gather_site(const isogi_trace__scene *scene, const isog
         for (i = 0; i < coefficients; i++) values[i] = (float)(ISOGI_TRACE__PI * wave->transfer[i] / desc->samples);
         return;
     }
-    isogi_trace__site_lights(scene, site, direct, counters);
+    isogi_trace__site_lights(scene, site, scene->high ? -1 : 1, direct, counters);
     for (c = 0; c < 3; c++) values[c] = (float)(ISOGI_TRACE__PI * sum[c] / desc->samples + direct[c]);
 }
 
@@ -2504,7 +2505,7 @@ static void isogi_trace__texel_sites(const isogi_trace *t, const size_t (*texels
         if (valid[i]) {
             valid[i] = (uint8_t)isogi_trace__site_normal(&t->scene, normal[n++], &sites[i]);
             if (t->scene.high && valid[i])
-                valid[i] = (uint8_t)isogi_trace__off_surface(&t->scene, &sites[i], ISOGI_TRACE__DEPTH, grid, &beyond);
+                valid[i] = (uint8_t)isogi_trace__off_surface(&t->scene, &sites[i], 1, ISOGI_TRACE__DEPTH, grid, &beyond);
         }
 }
 
@@ -3644,7 +3645,7 @@ static void isogi_trace__bake_task(void *arg, size_t task) {
         site.key = isogi_trace__key(isogi_trace__key(t->scene.desc.seed, 0),
                                     (uint64_t)x[0] +
                                         (uint64_t)t->lattice[0] * ((uint64_t)x[1] + (uint64_t)t->lattice[1] * (uint64_t)x[2]));
-        isogi_trace__site_start(&t->scene, &site);
+        isogi_trace__site_start(&t->scene, &site, t->scene.high);
         isogi_trace__gather_site(&t->scene, &site, &t->waves[task], values, &error, counters);
         isogi_trace__record_write(t, isogi_trace__record(t, ref->brick, ref->slot), values, error);
         ref->brick->state[ref->slot] = ISOGI_TRACE__DONE;
@@ -4739,21 +4740,18 @@ static int isogi_trace__span_site(isogi_trace__cast *c, uint32_t k) {
     isogi_trace__site *site = &c->site[k];
     uint64_t seed = t->scene.desc.seed;
     if (n->brick) {
-        const size_t x[3] = {n->texel[0], n->texel[1], n->texel[2]}, *l = t->lattice;
+        const size_t x[3] = {n->texel[0], n->texel[1], n->texel[2]};
         if (!(isogi_trace__dot(n->normal, n->normal) > 0)) return 0;
         memcpy(site->normal, n->normal, sizeof site->normal);
-        site->key = isogi_trace__key(isogi_trace__key(seed, 2),
-                                     (uint64_t)x[0] + (uint64_t)l[0] * ((uint64_t)x[1] + (uint64_t)l[1] * (uint64_t)x[2]));
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 6), isogi_trace__turned_key(x));
         isogi_trace__turn(x, c->turn[k]);
     } else if (n->key == n->cell) { /* the first probe of its cell: turned like a texel, since hits of one texel read many of a wall */
         const size_t x[3] = {n->place.cell[0], n->place.cell[1], n->place.cell[2]};
-        site->key = isogi_trace__key(isogi_trace__key(seed, 4), n->key);
         c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 5), isogi_trace__turned_key(x));
         isogi_trace__turn(x, c->turn[k]);
-    } else site->key = c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key), c->turn[k][0] = c->turn[k][1] = 0;
+    } else c->sequence[k] = isogi_trace__key(isogi_trace__key(seed, 4), n->key), c->turn[k][0] = c->turn[k][1] = 0;
     site->place = n->place, site->isovalue = n->isovalue, site->from = n->from;
-    isogi_trace__site_start(&t->scene, site);
+    isogi_trace__site_start(&t->scene, site, n->from < 0);
     return 1;
 }
 
@@ -4815,7 +4813,8 @@ static void isogi_trace__cast_piece(isogi_trace__cast *c, isogi_trace__piece *pi
         isogi_trace__cast_round(c, spans);
     }
     for (k = 0; k < spans; k++)
-        if (!c->span[k].nowhere && !c->span[k].first) isogi_trace__site_lights(&t->scene, &c->site[k], c->span[k].steady, c->counters);
+        if (!c->span[k].nowhere && !c->span[k].first)
+            isogi_trace__site_lights(&t->scene, &c->site[k], c->site[k].from, c->span[k].steady, c->counters);
 }
 
 /* Tasks of the batch. */
@@ -5263,7 +5262,7 @@ static int isogi_trace__pass_end(isogi_trace *t) {
     if (f->pass > 1 && change < f->before && change * change < 1e-3 * largest * (f->before - change)) return 1;
     f->before = change;
     if (f->pass % 500 == 499) {
-        f->diverges = f->pass > 500 && change > 0.8 * f->middle;
+        f->diverges = t->scene.desc.bounces < 0 && f->pass > 500 && change > 0.8 * f->middle;
         f->middle = change;
         if (f->diverges || f->pass > ISOGI_TRACE__MAX_DEPTH) return 1;
     }
@@ -5560,6 +5559,26 @@ static void isogi_trace__guide_series(const isogi_trace *t, const isogi_trace__n
     if (samples > ISOGI_TRACE__SPREAD_FROM) g->spread *= (float)(ISOGI_TRACE__SPREAD_FROM / samples);
 }
 
+/* Variance of the mean of what rays of the hemisphere bring, over pi squared; rgb: its sum. A ray that hits brings what glows there (where
+   it is not known, as the texel itself) and what is reflected there: neither is without the other. With no_shadows it brings the sky's
+   light, too: that is taken as if all of it came together (standard errors add up, Cauchy and Schwarz). */
+static double isogi_trace__shared_spread(const isogi_trace *t, const isogi_trace__node *n, const isogi_trace__guide *g, const float *direct,
+                                         const float *bounce, const double rgb[3]) {
+    const double samples = (double)n->samples;
+    double part[3], both = 0, error;
+    int a;
+    if (t->scene.desc.no_shadows) {
+        for (a = 0; a < 3; a++) part[a] = (double)direct[a];
+        error = sqrt(isogi_trace__mean_variance(isogi_trace__luminance(part), n->square, samples));
+        for (a = 0; a < 3; a++) part[a] = (double)bounce[a] / ISOGI_TRACE__PI;
+        error += sqrt(isogi_trace__mean_variance(isogi_trace__luminance(part), n->bounce_square, samples));
+        return error * error;
+    }
+    for (a = 0; a < 3; a++) part[a] = (double)g->glow[a];
+    if (isogi_trace__coloured(&t->scene.desc)) both = 2 * isogi_trace__luminance(part) * (samples * (double)g->reflected / ISOGI_TRACE__PI);
+    return isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square + both, samples);
+}
+
 /* The part of a texel's irradiance that neighbours may share, and its variance: what comes from the sky, by both kinds of rays, and by
    reflection. Lights keep sharp shadows: they are not filtered. */
 static void isogi_trace__guide_task(void *arg, size_t task) {
@@ -5591,7 +5610,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
             continue;
         }
         g->luminance = (float)(ISOGI_TRACE__PI * scale * (isogi_trace__luminance(rgb) + isogi_trace__luminance(n->bright)));
-        spread = isogi_trace__mean_variance(isogi_trace__luminance(rgb), n->square + n->bounce_square, (double)n->samples);
+        spread = isogi_trace__shared_spread(t, n, g, direct, bounce, rgb);
         if (n->samples * rays > 1) spread += n->bright_spread * scale * rays / (n->samples * rays - 1);
         g->variance = (float)(ISOGI_TRACE__PI * ISOGI_TRACE__PI * spread / square);
     }
@@ -6688,7 +6707,8 @@ static double isogi_trace__open_error(const isogi_trace *t, const float *values,
                 isogi_trace__unseen(ISOGI_TRACE__PI, light, error > 0 ? 1 / (error * error) : 1e9));
 }
 
-static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r) {
+/* known: texels of known errors. */
+static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r, uint64_t *known) {
     float values[ISOGI_TRACE__VALUES];
     size_t i;
     uint32_t slot;
@@ -6706,24 +6726,25 @@ static void isogi_trace__status_add(const isogi_trace *t, isogi_trace_report *r)
             if (t->scene.desc.mode == ISOGI_TRACE_IRRADIANCE) r->light += isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
             else error = isogi_trace__open_error(t, values, error);
             if (error > r->worst) r->worst = error;
-            if (isogi_trace__finite(error)) r->error += error * error;
+            if (isogi_trace__finite(error)) r->error += error * error, ++*known;
         }
-    if (t->coarse) isogi_trace__status_add(t->coarse, r);
+    if (t->coarse) isogi_trace__status_add(t->coarse, r, known);
     if (!t->feedback) return;
     r->probes += t->feedback->probes_before + t->feedback->probes.count;
     r->diverges |= t->feedback->diverges | t->feedback->diverged;
 }
 
 ISOGI_API void isogi_trace_status(const isogi_trace *trace, isogi_trace_report *report) {
+    uint64_t known = 0;
     if (!report) return;
     memset(report, 0, sizeof *report);
     if (!trace) return;
-    isogi_trace__status_add(trace, report);
-    if (trace->high) isogi_trace__status_add(trace->high, report);
+    isogi_trace__status_add(trace, report, &known);
+    if (trace->high) isogi_trace__status_add(trace->high, report, &known);
     report->unit = trace->scene.open_light;
     if (!report->texels) return;
     report->light = sqrt(report->light / (double)report->texels);
-    report->error = sqrt(report->error / (double)report->texels);
+    report->error = known ? sqrt(report->error / (double)known) : HUGE_VAL;
 }
 
 /* ==== export ========================================================================================================= */
@@ -7378,6 +7399,13 @@ static isogi_result isogi_trace__change_reserve(isogi_trace__change *c) {
 }
 
 static void isogi_trace__change_undo(isogi_trace__change *c) {
+    isogi_trace *t = c->trace;
+    size_t i, slot;
+    for (i = 0; i < t->brick_count && !t->scene.desc.lazy; i++) { /* bricks that have just come, of which nothing is known */
+        int known = !t->bricks[i] || t->bricks[i]->held;
+        for (slot = 0; slot < ISOGI_TRACE__TEXELS && !known; slot++) known = t->bricks[i]->state[slot] > ISOGI_TRACE__NOT_ASKED;
+        if (!known) isogi_trace__brick_free(t, t->bricks[i]), t->bricks[i] = NULL;
+    }
     isogi_release(&c->trace->context, c->queue, c->capacity, sizeof *c->queue);
     if (!c->desc) return;
     isogi_trace__scene_swap(c);
@@ -7592,9 +7620,9 @@ static void isogi_trace__gather_task(void *arg, size_t task) {
             isogi_trace__place_normals(job->scene.pyramid, job->scene.desc.normals, &site.place, 1, gradient);
             if (!isogi_trace__site_normal(&job->scene, gradient[0], &site)) continue;
         }
-        if (job->scene.high && !isogi_trace__off_surface(&job->scene, &site, ISOGI_TRACE__DEPTH, grid, &beyond)) continue;
+        if (job->scene.high && !isogi_trace__off_surface(&job->scene, &site, 1, ISOGI_TRACE__DEPTH, grid, &beyond)) continue;
         site.key = isogi_trace__key(isogi_trace__key(job->scene.desc.seed, 1), (uint64_t)i);
-        isogi_trace__site_start(&job->scene, &site);
+        isogi_trace__site_start(&job->scene, &site, job->scene.high);
         isogi_trace__gather_site(&job->scene, &site, &job->waves[task], job->irradiance[i], &job->error[i], &counters);
     }
 }

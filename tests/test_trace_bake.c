@@ -1457,6 +1457,28 @@ TEST(errors_are_honest) {
     }
 }
 
+/* What glows where it reflects, and what is lit by all of the sky through everything, is told as honestly: a ray brings both at once. */
+SLOW_TEST(errors_of_what_glows_and_reflects_are_honest) {
+    enum { POINTS = 80 };
+    static float points[POINTS][3], e[POINTS][3], expected[POINTS];
+    double q[1] = {0.5};
+    scene s = scene_make(25, 25, 25, NULL, gyroid, q);
+    isogi_albedo_point glow[1] = {{0, {1, 1, 1}}};
+    CHECK(surface_points(&s, 0, POINTS, 5, points) == POINTS, "too few points, %d", POINTS);
+    for (int k = 0; k < 2; k++) {
+        isogi_trace_desc d = feedback(&s, 0.8f, 2, 2048);
+        if (k) d.no_shadows = 1;
+        else d.emission_points = glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
+        d.lazy = 1, d.method = ISOGI_TRACE_PATHS;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, POINTS, e);
+        for (int i = 0; i < POINTS; i++) expected[i] = e[i][1];
+        d.method = ISOGI_TRACE_FEEDBACK;
+        for (d.samples = 16; d.samples <= 64; d.samples *= 4)
+            covered(k ? "no shadows" : "glow", d, (const float(*)[3])points, POINTS, expected, 0.93);
+    }
+    scene_free(&s);
+}
+
 /* The error falls as the sampler promises: independent numbers would give a slope of -1/2 on a log-log plot; a (0,2)-sequence does better
    where the light is smooth (up to -1), and no worse at the shadows' borders. 60 points of a pit and of the plane below a ball, of the
    method that has no bias, and 4 seeds; the slope of a least-squares line over 4 .. 256 samples. */
@@ -1618,6 +1640,12 @@ TEST(report_is_that_of_all_texels) {
               sum.error, sum.worst);
         isogi_trace_free(t), isogi_trace_free(coarse);
     }
+    isogi_trace_desc single = desc_make(&s, 0.5f, 1, 1); /* one sample says nothing of its error */
+    isogi_trace *t = baked(&single);
+    isogi_trace_report report;
+    isogi_trace_status(t, &report);
+    CHECK(isinf(report.error) && isinf(report.worst) && report.texels > 100, "errors %g, %g", report.error, report.worst);
+    isogi_trace_free(t);
     scene_free(&s);
 }
 

@@ -913,6 +913,43 @@ TEST(every_allocation_may_fail) {
     scene_free(&s);
 }
 
+/* A touch that fails leaves lookups as they were, also where no texel around has a surface and the nearest one is read, and no memory. */
+TEST(a_touch_that_fails_changes_no_lookup) {
+    static float voxels[24 * 24 * 24];
+    static const float sky[3] = {3.5449f, 3.5449f, 3.5449f}, point[1][3] = {{6.5f, 12.3f, 12.3f}};
+    const size_t first[3] = {4, 4, 4}, last[3] = {20, 20, 20};
+    for (int i = 0; i < 24 * 24 * 24; i++) voxels[i] = i % 24 >= 8;
+    for (int method = 0; method < 2; method++) {
+        scarce memory = {-1, 0};
+        const isogi_context context = {.alloc = scarce_alloc, .release = scarce_release, .user = &memory, .threads = 1};
+        const isogi_volume v = {.data = voxels, .type = ISOGI_F32, .size = {24, 24, 24}};
+        isogi_pyramid *pyramid = NULL;
+        isogi_trace *t = NULL;
+        float before[1][3], after[1][3];
+        int failed = 0;
+        CHECK(isogi_vol_build(&pyramid, &v, &context) == ISOGI_OK, "build");
+        const isogi_trace_desc d = {.pyramid = pyramid, .lighting = {.env = {.sh = sky, .sh_order = 1}}, .samples = 8,
+                                    .method = (isogi_trace_method)method};
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+        isogi_trace_sample(t, point, 1, before, NULL);
+        const size_t bytes = isogi_trace_memory(t);
+        for (long k = 0; k < 100; k++) {
+            memory.left = k;
+            const isogi_result result = isogi_trace_touch(t, first, last);
+            memory.left = -1;
+            if (result == ISOGI_OK) break;
+            failed++;
+            isogi_trace_sample(t, point, 1, after, NULL);
+            CHECK(!memcmp(before, after, sizeof after), "method %d, allocation %ld: %g, before %g", method, k, (double)after[0][1],
+                  (double)before[0][1]);
+            CHECK(isogi_trace_memory(t) == bytes, "method %d, allocation %ld: %zu bytes, before %zu", method, k, isogi_trace_memory(t),
+                  bytes);
+        }
+        CHECK(failed > 2 && before[0][1] > 1, "%d allocations failed, E %g", failed, (double)before[0][1]);
+        isogi_trace_free(t), isogi_vol_free(pyramid);
+    }
+}
+
 /* A new lighting of transfer, with an image whose bright spots are looked for: each allocation fails once, on either side and level. The
    light stays as it was, and the same call works afterwards. */
 TEST(every_allocation_of_a_lighting_may_fail) {

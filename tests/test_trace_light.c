@@ -632,6 +632,53 @@ TEST(without_shadows_a_closed_ball_is_lit_from_outside) {
     scene_free(&s);
 }
 
+/* A closed white room that glows: n reflections bring n + 1 times what is sent, however many these are, and are no endless light. */
+TEST(thousands_of_reflections_are_no_endless_light) {
+    double q[5] = {8, 8, 8, 5.2, 30};
+    scene s = scene_make(17, 17, 17, NULL, shell, q);
+    const isogi_albedo_point glow = {0, {1, 1, 1}};
+    const float p[1][3] = {{8, 8, 13.2f}};
+    for (int bounces = 900; bounces <= 1500; bounces += 600) {
+        isogi_trace_desc d = desc_make(&s, 1, bounces, 16);
+        isogi_trace *t = NULL;
+        isogi_trace_report report;
+        float e[1][3], error[1];
+        d.method = ISOGI_TRACE_FEEDBACK, d.isovalue_min = -0.2, d.isovalue_max = 0.2;
+        d.emission_points = &glow, d.emission_count = 1, d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+        isogi_trace_status(t, &report), isogi_trace_sample(t, p, 1, e, error);
+        CHECK(fabs((double)e[0][1] / PI - bounces - 1) < 0.02 * bounces && !report.diverges && isfinite(error[0]),
+              "%d reflections: E %g pi, error %g, endless %d", bounces, (double)e[0][1] / PI, (double)error[0], report.diverges);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* At an open border, ground below a body that the border cuts: rays that start beyond it meet that body from within, which reflects as its
+   own inner side, not as the outer one under the sun. */
+static double under_a_cut(const double p[3], const double *q) {
+    const double ground = 8 + 0.7 * (p[0] < 3 ? p[0] : 3) - p[1];
+    return fmax(ground, fmin(p[1] - q[0], q[1] - p[1]));
+}
+TEST(surfaces_seen_from_within_reflect_on_their_inner_side) {
+    double q[2] = {12.3, 20.4};
+    scene s = scene_make(33, 33, 33, NULL, under_a_cut, q);
+    const isogi_light sun = {.vector = {0, 1, 0}, .rgb = {1, 1, 1}};
+    static const float p[1][3] = {{0, 8, 16}};
+    for (int far = 0; far < 2; far++) {
+        float e[2][1][3];
+        for (int method = 0; method < 2; method++) {
+            isogi_trace_desc d = desc_make(&s, 1, 1, 4096);
+            d.lighting.env.sh = NULL, d.lighting.env.sh_order = 0, d.lighting.lights = &sun, d.lighting.light_count = 1;
+            d.offset = far ? 1 : 0, d.lazy = 1, d.method = (isogi_trace_method)method;
+            bake_and_sample(&d, NULL, p, 1, e[method]);
+        }
+        CHECK(fabs((double)e[0][0][1] - (double)e[1][0][1]) < 0.003, "offset %s: %.4f, by paths %.4f", far ? "1" : "default",
+              (double)e[0][0][1], (double)e[1][0][1]);
+    }
+    scene_free(&s);
+}
+
 /* Ambient occlusion of radius d below an infinite ceiling at height h: only rays within acos(h/d) of the normal are blocked: E = pi
    (h/d)^2; below the height nothing is. The radius is that around the place on the surface, wherever rays start. */
 static double slot(const double p[3], const double *q) { return fmax(q[0] - p[1], p[1] - q[1]); }
