@@ -4299,11 +4299,21 @@ static int isogi_vol__has_cap(const isogi_vol__walk *w, const double local[3]) {
     return isogi_vol__finite64(isogi_vol__field_at(w->pyramid, grid, gradient));
 }
 
+/* The cell in which the ray ends: of those that touch the place, the one that it has come through. */
+static void isogi_vol__last_cell(isogi_vol__walk *w, double local[3]) {
+    int a;
+    for (a = 0; a < 3; a++) {
+        const double slack = ISOGI_VOL__ROUNDING * (fabs(w->base * w->dir[a]) + w->pyramid->box[a]);
+        w->cell[a] = isogi_vol__cell(w->origin[a] + w->end * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+        if (w->dir[a] > 0 && w->cell[a] > 0 && local[a] < slack) w->cell[a]--, local[a] = 1;
+        if (w->dir[a] < 0 && w->cell[a] + 1 < w->pyramid->cells[a] && local[a] > 1 - slack) w->cell[a]++, local[a] = 0;
+    }
+}
+
 /* Where the ray leaves a capped volume while inside. */
 static int isogi_vol__cap_exit(isogi_vol__walk *w, isogi_hit *hit) {
     double local[3];
-    int a;
-    for (a = 0; a < 3; a++) w->cell[a] = isogi_vol__cell(w->origin[a] + w->end * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+    isogi_vol__last_cell(w, local);
     if (!isogi_vol__has_cap(w, local)) return 0;
     isogi_vol__emit(w, w->end, local, -2, hit);
     return 1;
@@ -4643,7 +4653,7 @@ static int isogi_vol__clip(isogi_vol__walk *w, double tmin, double tmax) {
     for (a = 0; a < 3; a++)
         if (w->dir[a] > 0 || w->dir[a] < 0)
             w->end = isogi_vol__min(w->end, ((w->dir[a] > 0 ? w->pyramid->cells[a] : 0) - w->origin[a]) * w->inverse[a]);
-    w->end_is_border = !(tmax - enter < w->end);
+    w->end_is_border = tmax - enter > w->end; /* one that ends there does not come out */
     w->end = isogi_vol__min(w->end, tmax - enter);
     return 1;
 }
@@ -4687,7 +4697,7 @@ ISOGI_VOL__TARGET("avx2") static int isogi_vol__aim_avx2(isogi_vol__walk *w, con
     origin = _mm256_blendv_pd(origin, front, isogi_vol__lane(w->entry_axis));
     t1 = _mm256_blendv_pd(_mm256_mul_pd(_mm256_sub_pd(back, origin), inverse), unlimited, still);
     w->base = enter, w->t = 0, w->end = isogi_vol__least4(t1);
-    w->end_is_border = !(tmax - enter < w->end);
+    w->end_is_border = tmax - enter > w->end; /* one that ends there does not come out */
     w->end = isogi_vol__min(w->end, tmax - enter);
     _mm256_storeu_pd(w->origin, origin), _mm256_storeu_pd(w->dir, d), _mm256_storeu_pd(w->inverse, inverse);
     return 1;
@@ -4782,11 +4792,10 @@ static int isogi_vol__any_will_do(const isogi_vol__batch *b) { return b->occlude
 
 static uint32_t isogi_vol__flags(const isogi_vol__batch *b, size_t i) { return b->rays ? b->rays[b->bundle ? 0 : i].flags : b->flags; }
 
-/* Whether the field is inside at the present cell's point that lies at t. */
-static int isogi_vol__inside_at(isogi_vol__walk *w, double t) {
+/* Whether the field is inside where the ray ends. */
+static int isogi_vol__ends_inside(isogi_vol__walk *w) {
     double corner[8], local[3];
-    int a;
-    for (a = 0; a < 3; a++) w->cell[a] = isogi_vol__cell(w->origin[a] + t * w->dir[a], w->pyramid->volume.size[a], &local[a]);
+    isogi_vol__last_cell(w, local);
     return isogi_vol__corners(w->pyramid, w->cell, w->isovalue, corner) && isogi_vol__trilinear(corner, local, NULL) >= 0;
 }
 
@@ -6759,7 +6768,7 @@ static int isogi_vol__enters_inside(isogi_vol__walk *w, isogi_hit *hit) {
 static int isogi_vol__leaves_inside(isogi_vol__walk *w, uint32_t flags, isogi_hit *hit) {
     if (!(w->deflated >= w->end)) w->deflate = 0;
     if (!(flags & ISOGI_RAY_CAPPED) || !w->end_is_border) return 0;
-    if (w->inside < 0 && !w->deflate) w->inside = isogi_vol__inside_at(w, w->end);
+    if (w->inside < 0 && !w->deflate) w->inside = isogi_vol__ends_inside(w);
     return w->inside == 1 && isogi_vol__cap_exit(w, hit);
 }
 
@@ -9195,6 +9204,8 @@ static int isogi_vol__visit_field(isogi_vol__walk *w, double t_out, isogi_hit *h
     }
     if (w->deflate) {
         const int before = w->inside;
+        /* a cell that ends at once tells nothing: the next one divides the root out */
+        if (t_out < w->end && t_out < 65536 * ISOGI_VOL__ON_SURFACE * least) return 0;
         next = at;
         if (!isogi_vol__leave_field(w, &at, t_out, m, least)) {
             if (before >= 0 && w->inside >= 0) w->inside = before;

@@ -399,4 +399,40 @@ TEST(bundles_and_continued_rays_meet_functions_too) {
     isogi_vol_free(p);
 }
 
+/* Rays leave hits that lie within roundings of a lattice plane for good: no cell that they are in for no way brings the surface back. */
+static double square_ball(void *user, const double p[3], double g[3]) {
+    double f = 0;
+    (void)user;
+    for (int a = 0; a < 3; a++) f += p[a] * p[a], g[a] = 2 * p[a];
+    return f;
+}
+TEST(hits_beside_lattice_planes_are_left_for_good) {
+    const isogi_field f = {.value = square_ball, .hessian = 2, .low = {-1, -1, -1}, .high = {1, 1, 1}, .cells = {16, 16, 16}};
+    isogi_pyramid *p = NULL;
+    test_random r = {9};
+    long starts = 0, again = 0;
+    CHECK(isogi_vol_build_field(&p, &f, NULL) == ISOGI_OK, "build");
+    for (double beside = 1e-3; beside > 1e-14; beside /= 10)
+        for (int i = 0; i < (LONG_SUITE ? 20000 : 5000); i++) {
+            const double aim[3] = {0.5, beside * random_range(&r, -1, 1), beside * random_range(&r, -1, 1)};
+            isogi_ray ray = {.isovalue = 0.25};
+            isogi_hit hit, next;
+            double along = 0, grid[3], world[3];
+            float dir[1][3];
+            for (int a = 0; a < 3; a++) {
+                ray.dir[a] = (float)(a ? random_range(&r, -1, 1) : random_range(&r, -1.1, -0.1));
+                ray.origin[a] = aim[a] - (double)ray.dir[a], dir[0][a] = (float)random_range(&r, -1, 1);
+            }
+            isogi_vol_intersect(p, &ray, 1, &hit, NULL);
+            if (!hit.side) continue;
+            for (int a = 0; a < 3; a++) grid[a] = hit.cell[a] + hit.local[a];
+            isogi_vol_to_world(p, grid, world);
+            for (int a = 0; a < 3; a++) along += world[a] * (double)dir[0][a];
+            isogi_vol_continue(p, &hit, (const float(*)[3])dir, NULL, 0.25, 0, 1, &next, NULL);
+            starts++, again += next.side && (next.t < 1e-7 || along > 1e-9) && fabs(along) > 1e-6;
+        }
+    CHECK(starts > 10000 && again == 0, "%ld of %ld starts meet the ball again at once", again, starts);
+    isogi_vol_free(p);
+}
+
 TEST_MAIN("vol_field")

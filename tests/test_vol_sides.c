@@ -249,6 +249,77 @@ TEST(cells_that_are_not_finite_have_no_cap) {
     CHECK(caps > 2000 && holes > 1000, "%ld caps, %ld holes: the test says little", caps, holes);
 }
 
+/* Along lattice diagonals rays leave through edges where two cells meet: the cell that they come from says whether there is a cap. */
+TEST(rays_through_edges_leave_by_their_own_cell) {
+    static float voxel[12 * 12 * 12];
+    test_random r = {31};
+    long rays = 0, wrong = 0;
+    for (int turn = 0; turn < 300; turn++) {
+        isogi_volume v = {.data = voxel, .type = ISOGI_F32};
+        size_t count = 1;
+        for (int a = 0; a < 3; a++) v.size[a] = 4 + (size_t)(random_bits(&r) % 9), count *= v.size[a];
+        for (size_t i = 0; i < count; i++) voxel[i] = random_bits(&r) % 40 ? 1 + (float)(random_bits(&r) % 2) : NAN;
+        isogi_pyramid *p[6];
+        for (int k = 0; k < 6; k++) {
+            const isogi_context context = {.threads = 1, .force_path = 1 + k % 3};
+            v.compact = k > 2;
+            CHECK(isogi_vol_build(&p[k], &v, &context) == ISOGI_OK, "build");
+        }
+        for (int n = 0; n < 20; n++) {
+            isogi_ray ray = {.isovalue = 0.5, .flags = ISOGI_RAY_CAPPED};
+            const int still = (int)(random_bits(&r) % 3);
+            double enter = 0, leave = 1e9, corner[8];
+            for (int a = 0; a < 3; a++) {
+                const double most = (double)v.size[a] - 1;
+                if (a == still) {
+                    ray.origin[a] = (double)(random_bits(&r) % (v.size[a] - 1)) + random_range(&r, 0.125, 0.875);
+                    continue;
+                }
+                ray.dir[a] = random_bits(&r) & 1 ? 1 : -1;
+                ray.origin[a] = (double)(random_bits(&r) % v.size[a]) - 20 * (double)ray.dir[a];
+                enter = fmax(enter, ((ray.dir[a] > 0 ? 0 : most) - ray.origin[a]) * (double)ray.dir[a]);
+                leave = fmin(leave, ((ray.dir[a] > 0 ? most : 0) - ray.origin[a]) * (double)ray.dir[a]);
+            }
+            if (!(enter < leave)) continue;
+            uint32_t last[3];
+            for (int a = 0; a < 3; a++) last[a] = (uint32_t)floor(ray.origin[a] + (leave - 0.5) * (double)ray.dir[a]);
+            const int capped = isogi_volume_corners(isogi_vol_volume(p[0]), last, corner);
+            rays++;
+            for (int k = 0; k < 6; k++) {
+                isogi_hit hits[8];
+                size_t found;
+                int out = 0;
+                isogi_vol_intersect_all(p[k], &ray, 1, 8, hits, &found, NULL);
+                for (size_t i = 0; i < found && i < 8; i++) out |= hits[i].side == -2;
+                wrong += out != capped;
+            }
+        }
+        for (int k = 0; k < 6; k++) isogi_vol_free(p[k]);
+    }
+    CHECK(rays > 3000 && wrong == 0, "%ld rays, %ld wrong exits on six paths", rays, wrong);
+}
+
+/* A ray that ends on the border does not come out of it, as one that ends on a surface does not; one from without goes in there. */
+TEST(rays_that_end_on_the_border_stay_inside) {
+    float voxel[125];
+    for (int i = 0; i < 125; i++) voxel[i] = i ? 1 : 2;
+    for (int path = 1; path <= 4; path++) {
+        const isogi_context context = {.threads = 1, .force_path = path};
+        const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {5, 5, 5}};
+        isogi_pyramid *p = NULL;
+        CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+        for (int k = 0; k < 6; k++) {
+            static const double to[6] = {0, 3, 4, 4.0000001, 5, 0}, from[6] = {0.5, 0.5, 0.5, 0.5, 0.5, -1};
+            isogi_ray ray = {.origin = {from[k], 1.5, 2.25}, .dir = {1, 0, 0}, .isovalue = 1, .flags = ISOGI_RAY_CAPPED};
+            isogi_hit hit;
+            ray.tmax = k == 5 ? 1 : to[k] > 0 ? to[k] - from[k] : 0;
+            isogi_vol_intersect(p, &ray, 1, &hit, NULL);
+            CHECK(hit.side == (k == 5 ? 2 : k == 1 || k == 2 ? 0 : -2), "path %d, to %g: side %d, t %.9g", path, to[k], hit.side, hit.t);
+        }
+        isogi_vol_free(p);
+    }
+}
+
 /* What the caps of rays are, the border of a closed mesh is: counted at the same places. */
 TEST(caps_are_where_closed_meshes_have_a_border) {
     test_random r = {103};
