@@ -217,12 +217,12 @@
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
    transparent (rays within its plane do sample it). For sweeps and the paper's method such a voxel alone does not exist: those around it
    keep their shadows. Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any number), 2^16 directions, and 2^24
-   samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur
-   and on which the transfer function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class.
-   They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and
-   where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in
-   common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force,
-   too. Errors:
+   samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur and
+   on which the transfer function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class: of
+   labels steps belong between values (4.5), since whole regions of exactly a step's value get a part of what begins there. They do where
+   the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and where no voxel
+   is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `scale`
+   and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors:
    ISOGI_INVALID for anything outside of its documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which),
    ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
@@ -1743,7 +1743,8 @@ static size_t isogi_dvr__renew_classes(isogi_dvr *d) {
     if (m->scale > 2 * m->kept_scale) {
         for (i = 0; i < d->changed_count && m->kept_scale > 0; i++) {
             const float *range = d->level[1].range[i];
-            if (!d->changed[i] && (double)range[1] > m->kept[0] && (double)range[0] < m->kept[1]) d->changed[i] = 1, count++;
+            /* those marked already, too: planes may have been prepared for them since */
+            if ((double)range[1] > m->kept[0] && (double)range[0] < m->kept[1]) d->changed[i] = 1, count++;
         }
         m->kept_scale = m->scale, m->kept[0] = span[0], m->kept[1] = span[1];
     } else {
@@ -2938,7 +2939,8 @@ ISOGI_API isogi_result isogi_dvr_create(isogi_dvr **dvr, const isogi_dvr_desc *d
     d->piece = desc->step > 0 ? resolved.step : 1;
     d->visibility_step = resolved.visibility_step > 0 ? resolved.visibility_step : 2 * resolved.step;
     isogi_vol_range(resolved.pyramid, d->range);
-    d->base = isogi_dvr__count_from(d, d->range[0]);
+    /* the value nearest to zero: one far from it that only few voxels have must not cost all others their digits */
+    d->base = isogi_dvr__count_from(d, d->range[0] > 0 ? d->range[0] : d->range[1] < 0 ? d->range[1] : 0);
     isogi_dvr__set_classes(d, NULL, d->range, ISOGI_DVR__TABLE, &d->matter.low, &d->matter.scale);
     d->method = isogi_dvr__method_now(d);
     d->kernels = isogi_dvr__choose_kernels(d->context.force_path);
@@ -3627,15 +3629,20 @@ typedef struct isogi_dvr__sheet {
 
 /* What a grid point counts for, by its own value. Without one (NaN) it is on no side. */
 static float isogi_dvr__sheet_weight(const isogi_dvr *d, const isogi_dvr__sheet *sheet, const size_t point[3]) {
-    double corner[8], u[3], value = 0;
-    int cell[3], a, n;
+    double corner[8], u[3], value;
+    int cell[3], a, i, n;
     for (a = 0; a < 3; a++) {
         const int cells = (int)d->cells[a];
         const double x = (d->desc.grid[a] > 1 ? (double)point[a] / (double)(d->desc.grid[a] - 1) : 0.5) * cells;
         cell[a] = (int)x < cells ? (int)x : cells - (cells > 0), u[a] = x - cell[a];
     }
     if (!isogi_vol_corners(d->desc.pyramid, cell, corner)) return 1;
-    for (n = 0; n < 8; n++) value += corner[n] * (n & 1 ? u[0] : 1 - u[0]) * (n & 2 ? u[1] : 1 - u[1]) * (n & 4 ? u[2] : 1 - u[2]);
+    for (a = 0, n = 4; a < 3; a++, n /= 2) /* from the nearer side: between equal values it is those, which may be the peak's */
+        for (i = 0; i < n; i++) {
+            const double from = corner[2 * i], to = corner[2 * i + 1];
+            corner[i] = u[a] < 0.5 ? from + u[a] * (to - from) : to + (1 - u[a]) * (from - to);
+        }
+    value = corner[0];
     return (value < sheet->isovalue) == (sheet->side > 0) ? 1 : (float)sheet->behind;
 }
 
@@ -3832,7 +3839,8 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
         if (c && c >= last) c = last - 1;
         u = (float)(x - (double)c), next = row[c + (last > 0) - first];
         value = row[c - first] + u * (next - row[c - first]);
-        if (!isogi_dvr__finite32(value)) value = u > 0 ? u < 1 ? value : next : row[c - first]; /* a neighbour without weight */
+        if (!isogi_dvr__finite32(value)) /* a neighbour without weight; or floats whose difference is none */
+            value = u > 0 ? u < 1 ? 2 * (0.5f * row[c - first] + u * (0.5f * next - 0.5f * row[c - first])) : next : row[c - first];
         if (!isogi_dvr__finite32(value)) continue;
         value = (value - low) * scale;
         value = value > 0 ? value : 0;
@@ -5752,7 +5760,7 @@ static double isogi_dvr__span_factor(isogi_dvr__span *s) {
         sum += 0.5 * isogi_dvr__steepness(s->walk.m, local);
     }
     sum *= p->to - p->from;
-    if (!s->sampled && s->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->path = sum;
+    if (s->silhouette != ISOGI_DVR_SILHOUETTE_APPROXIMATE) s->path = sum;
     return sum > change ? change > 0 && sum < 1e300 * change ? sum / change : 1e300 : 1;
 }
 
@@ -6416,6 +6424,7 @@ static int isogi_dvr__floats_tell(const isogi_dvr *d, double low, double scale, 
     if (!isogi_dvr__float_classes(d, scale) || !(fabs(v->scale) > 1e-30 && fabs(v->scale) < 1e30 && from < 1e37 && to < 1e37)) return 0;
     if (!(fabs((d->range[0] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;
     if (!(fabs((d->range[1] - v->bias) / v->scale) <= ISOGI_DVR__FLOATS)) return 0;
+    if (!((0.5 * d->range[1] - 0.5 * d->range[0]) / fabs(v->scale) <= 0.4999999 * ISOGI_DVR__FLOATS)) return 0; /* nor differences */
     return (v->type != ISOGI_F32 && v->type != ISOGI_F64) || !(d->range[0] < d->range[1]) ||
            ISOGI_DVR__TOLD_APART * span >= (from > to ? from : to);
 }
@@ -6504,7 +6513,7 @@ static void isogi_dvr__frame_light(void *arg, size_t task) {
         const float *v = d->visibility + point * d->coefficients;
         float sum[4] = {0, 0, 0, 0}, open = isogi_dvr__openness(v[0]);
         for (c = 0; c < d->coefficients; c++) isogi_dvr__add4(sum, sh[c], v[c]);
-        for (c = 0; c < 3; c++) {
+        for (c = 0; c < 3 && !job->frame.lamps; c++) { /* with lamps: once their light has been added, at pieces */
             float least = job->lights->least[c] * v[0];
             sum[c] = sum[c] > least ? sum[c] : least;
         }
@@ -7247,6 +7256,18 @@ static void isogi_dvr__fast_beside_lamps(const isogi_dvr__frame *f, const isogi_
     }
 }
 
+/* As isogi_dvr__leap where a piece may lead past a whole block, from one that is empty to another one: what is between their values
+   counts, and no sample is left out. */
+static int isogi_dvr__leap_none(const isogi_dvr *d, isogi_dvr__packet *p, isogi_counters *work) {
+    int k, found = 0;
+    (void)d, (void)work;
+    for (k = 0; k < ISOGI_DVR__RAYS; k++) {
+        p->next[k] = p->at[k] < p->count[k] ? p->at[k] : p->count[k], p->at[k] = p->next[k];
+        if (p->next[k] < p->count[k]) p->found[found++] = (uint8_t)k;
+    }
+    return found;
+}
+
 /* Front to back: all rays of a packet go to where the next matter may be, then each passes some of it. */
 static void isogi_dvr__fast_cast(const isogi_dvr__frame *f, const isogi_dvr__fast_ray r[ISOGI_DVR__RAYS],
                                  isogi_dvr__fast_state s[ISOGI_DVR__RAYS], isogi_counters *work) {
@@ -7308,7 +7329,7 @@ static int isogi_dvr__fast_begin(const isogi_dvr__frame *f, const double origin[
     }
     if (!(span[0] < span[1]) || !isogi_dvr__clipped(d, origin, dir, span)) return 0;
     pieces = ceil((span[1] - span[0]) * f->per_piece - 1e-6);
-    if (!(pieces < 1e7)) return 0;
+    if (!(pieces <= ISOGI_DVR__MAX_SAMPLES)) return 0;
     r->count = (int)pieces + 1;
     for (a = 0; a < 3; a++) {
         r->origin[a] = (float)isogi_dvr__clamp(origin[a] + span[0] * dir[a], d->cells[a]);
@@ -7580,7 +7601,7 @@ ISOGI_DVR__AVX512 void isogi_dvr__begin_avx512(const isogi_dvr__frame *f, const 
     _mm256_storeu_ps(end, _mm512_maskz_cvtpd_ps(255, pieces));
     pieces = _mm512_ceil_pd(_mm512_sub_pd(pieces, ISOGI_DVR__8(1e-6)));
     hit = (__mmask8)(hit & _mm512_cmp_pd_mask(enter, leave, _CMP_LT_OQ) & _mm512_cmp_pd_mask(leave, ISOGI_DVR__8(1e300), _CMP_LT_OQ) &
-                     _mm512_cmp_pd_mask(pieces, ISOGI_DVR__8(1e7), _CMP_LT_OQ));
+                     _mm512_cmp_pd_mask(pieces, ISOGI_DVR__8(ISOGI_DVR__MAX_SAMPLES), _CMP_LE_OQ));
     for (a = 0; a < 3; a++) {
         __m512d x = _mm512_loadu_pd(dir[a]), at = _mm512_add_pd(ISOGI_DVR__8(origin[a]), _mm512_mul_pd(enter, x));
         at = _mm512_maskz_min_pd(255, _mm512_maskz_max_pd(255, at, zero), ISOGI_DVR__8(d->cells[a])), x = _mm512_mul_pd(x, piece);
@@ -7708,6 +7729,8 @@ static isogi_result isogi_dvr__begin_frame(isogi_dvr__render_job *job) {
     f->dvr = d, f->step = d->piece, f->look = isogi_dvr__fast_look, f->shade = isogi_dvr__fast_shade, f->glow = (float)d->desc.emission;
     f->end = 1 - d->desc.opaque, f->dim = 0.125f;
     f->leap = blocks < 2e9 ? d->kernels.leap : isogi_dvr__leap;
+    for (a = 0; a < 3; a++) /* voxels of a piece, at most */
+        if (f->step * d->spacing * sqrt(isogi_dvr__dot(d->to_grid + 3 * a, d->to_grid + 3 * a)) > 3.999) f->leap = isogi_dvr__leap_none;
     f->tolerance = d->desc.tolerance > 0 ? (float)d->desc.tolerance : 0.5f;
     f->per_piece = 1 / (f->step * d->spacing);
     /* no infinity: that times no extinction would be no number */

@@ -2,6 +2,7 @@
    numbers at the ends of their ranges. */
 #define ISOGI_IMPLEMENTATION
 #include "isogi_dvr.h"
+#include <float.h>
 #include "dvr_fields.h"
 #include "test.h"
 
@@ -546,6 +547,191 @@ TEST(walls_beside_what_is_not_finite_keep_their_shadows) {
         CHECK(open < 3 && fabs(open - first) < 0.01, "axis %d, NaN at %d: %.4f, not %.4f", axis, gap, open, first);
         isogi_dvr_free(dvr), isogi_vol_free(p);
     }
+}
+
+/* One pixel along x, through the middle of a volume of floats. */
+typedef struct probe { double opacity, depth, red; } probe;
+static probe seen_along_x(const float *voxel, const size_t size[3], const isogi_dvr_desc *given, const isogi_transfer_point *points,
+                          size_t count, const isogi_lighting *lighting, int path) {
+    const isogi_context context = {.threads = 1, .force_path = path};
+    const isogi_transfer transfer = {points, count, NULL, 0};
+    const float y = 0.5f * (float)(size[1] - 1), z = 0.5f * (float)(size[2] - 1);
+    const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {size[0], size[1], size[2]}};
+    const isogi_view view = {.width = 1, .height = 1, .eye = {-10, y, z}, .target = {0, y, z}};
+    isogi_pyramid *p = NULL;
+    isogi_dvr *dvr = NULL;
+    isogi_dvr_desc desc = *given;
+    float pixel[1][4] = {{0}}, depth[1] = {0};
+    CHECK(isogi_vol_build(&p, &v, &context) == ISOGI_OK, "build");
+    desc.pyramid = p, desc.opaque = 1;
+    CHECK(isogi_dvr_create(&dvr, &desc, &context) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK &&
+              isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_render(dvr, &view, lighting, pixel, depth, NULL) == ISOGI_OK, "render");
+    isogi_dvr_free(dvr), isogi_vol_free(p);
+    return (probe){(double)pixel[0][3], (double)depth[0], (double)pixel[0][0]};
+}
+
+/* Up to 2^24 samples a ray are allowed, and taken. */
+TEST(rays_of_more_than_ten_million_samples) {
+    static float voxel[4 * 1010];
+    const size_t size[3] = {1010, 2, 2};
+    const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.0005f}};
+    const isogi_dvr_desc desc = {.step = 1e-4};
+    for (int i = 0; i < 4 * 1010; i++) voxel[i] = 1;
+    const probe p = seen_along_x(voxel, size, &desc, points, 2, NULL, 0);
+    CHECK(fabs(p.opacity - 0.396) < 0.1 && p.depth < 1100, "opacity %g, depth %g", p.opacity, p.depth); /* floats add up to much by then */
+}
+
+/* A piece of ray may lead over a whole block: what lies between the values at its ends counts, whatever else is in the volume. */
+TEST(pieces_longer_than_blocks_are_not_leapt_over) {
+    static float voxel[64 * 8 * 8];
+    const size_t size[3] = {64, 8, 8};
+    const isogi_transfer_point points[5] = {
+        {0.1, {1, 1, 1}, 0}, {0.4, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 1}, {0.6, {1, 1, 1}, 0}, {0.9, {1, 1, 1}, 0}};
+    for (int path = 1; path <= 4; path++)
+        for (int step = 3; step <= 12; step++) {
+            const isogi_dvr_desc desc = {.step = step, .tolerance = 1e30};
+            double opacity[2];
+            for (int near = 0; near < 2; near++) { /* matter where the ray begins */
+                for (int i = 0; i < 64 * 64; i++) voxel[i] = i % 64 > 20 ? 1 : near && i % 64 < 2 ? 0.45f : 0;
+                opacity[near] = seen_along_x(voxel, size, &desc, points, 5, NULL, path).opacity;
+            }
+            CHECK(opacity[0] > 0.2 && opacity[1] >= opacity[0] - 1e-5, "path %d, step %d: %.4f, %.4f with matter before", path, step,
+                  opacity[0], opacity[1]);
+        }
+}
+
+/* Floats whose difference is beyond floats. */
+TEST(matter_between_the_largest_floats) {
+    static float voxel[8 * 8 * 8];
+    const size_t size[3] = {8, 8, 8};
+    const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0}, {1, {1, 0.5f, 0.2f}, 0.2f}};
+    const isogi_dvr_desc desc = {.step = 0.25};
+    const float huge[4] = {1.6e38f, 1.8e38f, 3e38f, FLT_MAX};
+    for (int k = 0; k < 8; k++) {
+        for (int i = 0; i < 512; i++) voxel[i] = i % 8 < 4 ? -huge[k / 2] : huge[k / 2];
+        const probe p = seen_along_x(voxel, size, &desc, points, 2, NULL, k % 2);
+        CHECK(fabs(p.opacity - (1 - exp(-0.2 * 3.5))) < 2e-3, "%g, path %d: %.5f", (double)huge[k / 2], k % 2, p.opacity);
+    }
+    double open[2];
+    for (int k = 0; k < 2; k++) { /* and their shadows, by sweeps */
+        static float slabs[33 * 33 * 33];
+        isogi_pyramid *p = NULL;
+        for (int i = 0; i < 33 * 33 * 33; i++) slabs[i] = i % 33 % 4 == 2 ? (k ? 3e38f : 1.4e38f) : -0.9f * (k ? 3e38f : 1.4e38f);
+        const isogi_volume v = {.data = slabs, .type = ISOGI_F32, .size = {33, 33, 33}};
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+        const isogi_dvr_desc fog = {.order = 2, .directions = 64, .grid = {9, 9, 9}, .visibility_step = 2, .method = ISOGI_DVR_SWEEP};
+        isogi_dvr *dvr = fog_new(p, 0.3f, &fog);
+        open[k] = openness(dvr, 16, 16, 16);
+        isogi_dvr_free(dvr), isogi_vol_free(p);
+    }
+    CHECK(open[0] < 1 && fabs(open[0] - open[1]) < 0.01, "open %.4f, of the largest %.4f", open[0], open[1]);
+}
+
+/* The least light is that of the sum of sky and lamps, on every path. */
+TEST(lamps_are_added_before_the_least_light) {
+    enum { N = 32 };
+    static float voxel[N * N * N], image[16 * 32 * 3];
+    const isogi_transfer_point points[4] = {{0.2, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 0.05f}, {0.7, {1, 1, 1}, 0.05f}, {1, {0, 0, 0}, 20}};
+    const isogi_transfer transfer = {points, 4, NULL, 0};
+    const isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {15.5f, 6, 60}, .rgb = {12000, 12000, 12000}};
+    const isogi_lighting lighting = {.env = {.rgb = image, .width = 32, .height = 16}, .lights = &lamp, .light_count = 1};
+    const isogi_view view = {.width = 1, .height = 1, .eye = {15.5f, 5, 100}, .target = {15.5f, 5, 15}, .fov = 1};
+    const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {N, N, N}};
+    isogi_pyramid *p = NULL;
+    float pixel[2][1][4];
+    for (int i = 0; i < N * N * N; i++) voxel[i] = i / N % N >= 18 && i / N % N < 21 ? 1 : i / N % N < 12 ? 0.5f : 0;
+    for (int i = 0; i < 16 * 32 * 3; i++) image[i] = i < 2 * 32 * 3 ? 100 : 0.02f; /* a bright spot above, hidden by a wall */
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int way = 0; way < 2; way++) {
+        const isogi_dvr_desc desc = {.pyramid = p, .shading = ISOGI_DVR_VISIBILITY, .step = 0.25, .order = 3, .opaque = 1,
+                                     .directions = 128, .grid = {17, 17, 17}, .method = ISOGI_DVR_BRUTE,
+                                     .classification = way ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+        isogi_dvr *dvr = NULL;
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK &&
+                  isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_render(dvr, &view, &lighting, pixel[way], NULL, NULL) == ISOGI_OK,
+              "render");
+        isogi_dvr_free(dvr);
+    }
+    CHECK(fabs((double)pixel[0][0][0] - (double)pixel[1][0][0]) < 0.01 * (double)pixel[1][0][0], "by classes %.5f, sampled %.5f",
+          (double)pixel[0][0][0], (double)pixel[1][0][0]);
+    isogi_vol_free(p);
+}
+
+/* The paper's blocks hold the values of nearly all voxels as well as ever, however far off a single one is. */
+TEST(one_far_voxel_takes_no_digits_from_the_others) {
+    static float voxel[33 * 33 * 33], points[512][3], value[512], ambient[512][4];
+    const float far[4] = {0, -9999, -1e6f, -1e9f};
+    for (int k = 0; k < 4; k++) {
+        isogi_pyramid *p = NULL;
+        double off = 0;
+        for (int i = 0; i < 33 * 33 * 33; i++)
+            voxel[i] = i ? 0.5f + 0.5f * sinf(0.3f * (float)(i % 33)) * cosf(0.25f * (float)(i / 33 % 33)) : far[k];
+        const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {33, 33, 33}};
+        CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+        const isogi_dvr_desc desc = {.method = ISOGI_DVR_PAPER, .order = 2, .directions = 16, .grid = {5, 5, 5}, .reduction = 1};
+        isogi_dvr *dvr = fog_new(p, 0.1f, &desc);
+        for (int i = 0; i < 512; i++)
+            points[i][0] = (float)(18 + i % 8), points[i][1] = (float)(18 + i / 8 % 8), points[i][2] = (float)(18 + i / 64);
+        CHECK(isogi_dvr_sample_blocks(dvr, (const float(*)[3])points, 512, value, ambient[0]) == ISOGI_OK, "blocks");
+        for (int i = 0; i < 512; i++)
+            off = fmax(off, fabs((double)value[i] - (double)voxel[(int)points[i][0] + 33 * (int)points[i][1] + 1089 * (int)points[i][2]]));
+        CHECK(off < 1e-5, "a voxel of %g: values off by up to %g", (double)far[k], off);
+        isogi_dvr_free(dvr), isogi_vol_free(p);
+    }
+}
+
+/* Sweeps: what was prepared for a function of wide classes is prepared again for one of narrow ones, however far it had got. */
+TEST(planes_prepared_for_wide_classes_are_prepared_again) {
+    static float voxel[33 * 33 * 33];
+    const isogi_transfer_point wide[3] = {{500.02, {1, 1, 1}, 0}, {500.03, {1, 1, 1}, 0.2f}, {1000, {1, 0, 0}, 0.2f}};
+    const isogi_transfer before = {wide, 3, NULL, 0}, after = {wide, 2, NULL, 0};
+    const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {33, 33, 33}};
+    isogi_pyramid *p = NULL;
+    double open[3];
+    for (int i = 0; i < 33 * 33 * 33; i++) {
+        const int x = i % 33, y = i / 33 % 33, z = i / 1089;
+        voxel[i] = x % 16 || y % 16 || z % 16 ? (x / 4 + y / 4 + z / 4) % 2 ? 500.0f : 500.05f : 1000;
+    }
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 3; k++) { /* never the first function; a part of it; all */
+        const isogi_dvr_desc desc = {.pyramid = p, .shading = ISOGI_DVR_VISIBILITY, .order = 2, .directions = 64, .grid = {9, 9, 9},
+                                     .visibility_step = 1};
+        isogi_dvr *dvr = NULL;
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK, "create");
+        if (k) isogi_dvr_set_transfer(dvr, &before);
+        for (int i = 0; i < 28 && k == 1; i++) isogi_dvr_step(dvr, 1, NULL);
+        if (k == 2) isogi_dvr_step(dvr, 0, NULL);
+        CHECK(isogi_dvr_set_transfer(dvr, &after) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        open[k] = openness(dvr, 16, 16, 16);
+        isogi_dvr_free(dvr);
+    }
+    CHECK(fabs(open[1] - open[0]) < 0.01 && fabs(open[2] - open[0]) < 0.01, "anew %.4f, after a part %.4f, after all %.4f", open[0],
+          open[1], open[2]);
+    isogi_vol_free(p);
+}
+
+/* A ray along an isosurface has the opacity of those beside it, by samples too. */
+TEST(rays_along_isosurfaces_are_seen_by_samples_too) {
+    static float voxel[33 * 33 * 33], pixel[9][4];
+    const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0.02f}, {32, {1, 1, 1}, 0.02f}};
+    const isogi_transfer transfer = {points, 2, NULL, 0};
+    const isogi_volume v = {.data = voxel, .type = ISOGI_F32, .size = {33, 33, 33}};
+    const isogi_view view = {.width = 9, .height = 1, .eye = {16.5f, 16.5f, 100}, .target = {16.5f, 16.5f, 0}, .fov = 1e-2f};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < 33 * 33 * 33; i++) voxel[i] = (float)(i % 33);
+    CHECK(isogi_vol_build(&p, &v, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 6; k++) {
+        const isogi_dvr_desc desc = {.pyramid = p, .space = ISOGI_DVR_DATA, .opaque = 1,
+                                     .classification = (isogi_dvr_classification)(k / 2),
+                                     .silhouette = k % 2 ? ISOGI_DVR_SILHOUETTE_GRADIENT : ISOGI_DVR_SILHOUETTE_EXACT};
+        isogi_dvr *dvr = NULL;
+        CHECK(isogi_dvr_create(&dvr, &desc, NULL) == ISOGI_OK && isogi_dvr_set_transfer(dvr, &transfer) == ISOGI_OK &&
+                  isogi_dvr_render(dvr, &view, NULL, pixel, NULL, NULL) == ISOGI_OK, "render");
+        for (int i = 0; i < 9; i++)
+            CHECK(fabs((double)pixel[i][3] - (1 - exp(-0.02 * 32))) < 0.01, "case %d, pixel %d: %.4f", k, i, (double)pixel[i][3]);
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(p);
 }
 
 /* An isosurface seen edge on behind a block that has its value throughout is seen as it is from a hair beside it. (Not by the approximate
