@@ -308,7 +308,8 @@ typedef struct isogi_trace_desc {
                                   in cells where light differs by more than this share of its mean (beyond three standard errors), or
                                   where a texel has no surface. 0.1 to 0.5 is sensible. Saves rays and memory where light varies
                                   slowly (in a cavity two thirds of both at 0.4), but on scans, full of edges, it takes about as
-                                  many (make bench, rows lattice-). Not with lazy or a box; such a texture cannot be exported or saved */
+                                  many (make bench, rows lattice-). A single sample tells no errors: light makes no fine texels then.
+                                  Not with lazy or a box; such a texture cannot be exported or saved */
     size_t box_first[3], box_end[3]; /* only texels box_first <= i < box_end: a part of the bake, in the bits of the whole; all six 0 = all.
                                   FEEDBACK, unless lazy: these and all others of the cubes that they lie in, see ISOGI_TRACE_CUBE */
 } isogi_trace_desc;
@@ -364,7 +365,8 @@ ISOGI_API isogi_result isogi_trace_step(isogi_trace *trace, uint64_t max_rays, d
    tests/test_trace_bake.c): they allow for what samples that agree may all have missed, and for probes 2 % of reflected light. That is too
    little where much of the light is reflected and comes from lights without size, whose shadows are hard: at albedo 0.8, in narrow
    tunnels, twice the error told covers 60 to 90 % of points; and at any albedo in deep pits a few voxels wide under the sun or a lamp,
-   where reflected light may be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points;
+   where reflected light may be a fifth off however many samples there are: with 256 samples and more, or desc.error, 50 to 85 % of points,
+   as in hollows with a small way out to the sky (64 samples: 90 %);
    and where colours change strongly within a few voxels, which samples too near each other may miss: in a closed room of chequers of .05
    and .95, 2 voxels wide, errors are twice those told with 16 samples, 3.5 times with 128 (4 % of the light); and close to sphere lights
    that stand half in the ground, of which few samples meet what is above it (7 % of such points lie beyond twice the error). Nor is the
@@ -1492,7 +1494,7 @@ static int isogi_trace__site_normal(const isogi_trace__scene *scene, const float
 static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi_trace__site *site, int high, double offset,
                                     double grid[3], int *beyond) {
     const double *m = scene->to_grid;
-    double n[3], speed = 0;
+    double n[3], speed = 0, value;
     int a, attempt;
     for (a = 0; a < 3; a++) {
         n[a] = m[3 * a] * (double)site->normal[0] + m[3 * a + 1] * (double)site->normal[1] +
@@ -1510,7 +1512,9 @@ static int isogi_trace__off_surface(const isogi_trace__scene *scene, const isogi
         }
         if (*beyond && high && scene->desc.capped) continue;
         isogi_trace__locate(scene->volume, grid, &place);
-        if (*beyond || (isogi_trace__value(scene->volume, &place) < site->isovalue) != high) return 1;
+        if (*beyond) return 1;
+        value = isogi_trace__value(scene->volume, &place); /* what is not finite is no matter */
+        if ((isogi_trace__finite(value) && value >= site->isovalue) == high) return 1;
     }
     return 0;
 }
@@ -3216,15 +3220,30 @@ static void isogi_trace__irradiance(const isogi_trace *t, const double *values, 
     for (c = 0; c < 3; c++) rgb[c] = rgb[c] > least[c] ? rgb[c] : least[c];
 }
 
+/* Where a channel begins. */
+static int isogi_trace__first_value(const isogi_trace *t, int channel) {
+    return t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1 ? 0 : channel;
+}
+
+/* TRANSFER: what the throughputs of a sample sum up to, squared, over their mean. 1 where a path ends when it escapes; with no_shadows it
+   brings light at every reflection: as many terms as there may be, or twice their mean, as where lengths of paths are geometric. */
+static double isogi_trace__repeats(const isogi_trace *t, double first) {
+    const double most = 2 * 3.5449077018110318 * first / ISOGI_TRACE__PI, terms = (double)t->scene.desc.bounces + 1;
+    if (!t->scene.desc.no_shadows || !(most > 2)) return 1 + (t->scene.desc.no_shadows && t->scene.desc.bounces);
+    return terms > 0 && terms < most ? terms : most;
+}
+
 /* Variance of a texel's luminance. TRANSFER: a sample is X = pi * throughput * L(direction it left in), throughput at most 1, so that
    E[X^2] <= pi * (E under the lighting's square), and the luminance of a square is no less than the square of the luminance; its
    record holds 1 / sqrt(samples), of as many samples as what it shares is as good as, and of what the filter blurs. */
 static double isogi_trace__variance(const isogi_trace *t, const double *values, double error) {
-    double square[3], rgb[3], sky[3], spread;
+    double square[3], rgb[3], sky[3], first[3], spread;
     int c;
     if (t->scene.desc.mode != ISOGI_TRACE_TRANSFER || !isogi_trace__finite(error)) return error * error;
     isogi_trace__series_sum(t, values, t->square, square), isogi_trace__series_sum(t, values, t->lit.all, rgb);
-    spread = ISOGI_TRACE__PI * t->square_unit * isogi_trace__luminance(square) - isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
+    for (c = 0; c < 3; c++) first[c] = values[isogi_trace__first_value(t, c)];
+    spread = ISOGI_TRACE__PI * isogi_trace__repeats(t, isogi_trace__luminance(first)) * t->square_unit * isogi_trace__luminance(square) -
+             isogi_trace__luminance(rgb) * isogi_trace__luminance(rgb);
     for (c = 0; c < 3; c++) sky[c] = ISOGI_TRACE__PI * 0.28209479177387814 * (double)t->lit.all[c];
     return error * error * (spread > 0 ? spread : 0) +
            isogi_trace__unseen(isogi_trace__luminance(sky), isogi_trace__luminance(rgb), error > 0 ? 1 / (error * error) : 1e9);
@@ -3751,6 +3770,7 @@ typedef struct isogi_trace__segment {
     float (*albedo)[3];     /* of each hit, where colours go by place; else NULL: it is the node's, by isovalue */
     uint32_t *order;        /* of probes: the first `open` are the entries that passes still change; NULL of texels */
     size_t open;
+    double share;           /* the largest change as a share of the probe's own light */
     double change, largest; /* by the last pass, of probes, */
     double settled;         /* the largest value of the other entries */
 } isogi_trace__segment;
@@ -3918,7 +3938,8 @@ struct isogi_trace__feedback {
     size_t carried;  /* tasks of it that are done, */
     size_t sweeps;   /* and at work, */
     size_t segment, pass; /* texels' segment, pass over the probes */
-    double before, middle; /* largest change by the pass before, and 500 passes before */
+    double before, middle; /* largest share changed by the pass before, and largest change 500 passes before */
+    double dark;           /* a millionth of the largest light of the pass before */
     int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
     size_t made, made_bricks; /* of the queue: bricks that are done, and to do */
     size_t placed;   /* texels before this one know where they lie; */
@@ -5148,11 +5169,6 @@ static int isogi_trace__channel(const isogi_trace *t, int value) {
     return t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? value % t->scene.desc.transfer_channels : value;
 }
 
-/* Where a channel begins. */
-static int isogi_trace__first_value(const isogi_trace *t, int channel) {
-    return t->scene.desc.mode == ISOGI_TRACE_TRANSFER && t->scene.desc.transfer_channels == 1 ? 0 : channel;
-}
-
 /* What passes read of probes, in few bytes. The first pass begins with what comes from sky and lights; a probe that reads no other has
    settled. */
 static void isogi_trace__direct_task(void *arg, size_t task) {
@@ -5179,18 +5195,18 @@ static void isogi_trace__direct_task(void *arg, size_t task) {
    none that will change, has settled with this pass; the next one copies its light to the other kind, and later ones leave it out. watch:
    that is looked at. albedo: the segment's. */
 static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segment *s, size_t values, size_t channels,
-                                      const float (*albedo)[3], int watch) {
+                                      const float (*albedo)[3], double dark, int watch) {
     const int out = set->out, from = ISOGI_TRACE__OUT_VALUES + out, to = ISOGI_TRACE__OUT_VALUES + 1 - out;
     const size_t late = 8; /* entries ahead */
     size_t i, j, k, a, open = 0;
-    double largest = 0, most = 0;
+    double largest = 0, most = 0, part = 0;
     for (j = 0; j < s->open; j++) {
         size_t node;
         const isogi_trace__reflector *r;
         const float *bounce, *before;
         float *after;
         uint8_t settled = (uint8_t)watch;
-        double sum[ISOGI_TRACE__VALUES];
+        double sum[ISOGI_TRACE__VALUES], own[3], moved[3]; /* own: the largest value of each channel, down to `dark` */
         i = s->order[j], node = s->node[i], r = isogi_trace__reflector_at(set, node);
         before = isogi_trace__values_at(set, node, from, values), after = isogi_trace__values_at(set, node, to, values);
         if (j + late < s->open)
@@ -5206,6 +5222,7 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         }
         bounce = isogi_trace__values_at(set, node, ISOGI_TRACE__BOUNCE_VALUES, values);
         for (a = 0; a < values; a++) sum[a] = 0;
+        for (a = 0; a < channels; a++) own[a] = dark, moved[a] = 0;
         for (k = s->begin[i]; k < s->begin[i + 1]; k++) {
             const float *e = isogi_trace__values_at(set, s->probe[k], from, values);
             if (watch) settled &= *isogi_trace__settled_at(set, s->probe[k], out);
@@ -5217,12 +5234,16 @@ static void isogi_trace__pass_segment(isogi_trace__set *set, isogi_trace__segmen
         for (a = 0; a < values; a++) {
             double share = (double)r->one * (double)r->albedo[a % channels];
             double e = (double)bounce[a] + share * sum[a], change = fabs(e - (double)before[a]);
-            after[a] = (float)e;
-            most = change > most ? change : most, largest = fabs(e) > largest ? fabs(e) : largest;
+            after[a] = (float)e, e = fabs(e);
+            if (change > moved[a % channels]) moved[a % channels] = change;
+            if (e > own[a % channels]) own[a % channels] = e;
+            most = change > most ? change : most, largest = e > largest ? e : largest;
         }
+        for (a = 0; a < channels; a++)
+            if (moved[a] > part * own[a]) part = moved[a] / own[a];
         *isogi_trace__settled_at(set, node, 1 - out) = settled, s->order[open++] = (uint32_t)i;
     }
-    s->open = open, s->change = most, s->largest = largest > s->settled ? largest : s->settled;
+    s->open = open, s->change = most, s->share = part, s->largest = largest > s->settled ? largest : s->settled;
 }
 
 static void isogi_trace__pass_task(void *arg, size_t segment) {
@@ -5237,30 +5258,32 @@ static void isogi_trace__pass_task(void *arg, size_t segment) {
     }
     /* the compiler unrolls it; after a few passes nearly all of the probes that are left read each other in a circle */
     if (t->values == 3 && channels == 3 && !s->albedo)
-        isogi_trace__pass_segment(set, s, 3, 3, NULL, t->feedback->pass < ISOGI_TRACE__WATCHED);
+        isogi_trace__pass_segment(set, s, 3, 3, NULL, t->feedback->dark, t->feedback->pass < ISOGI_TRACE__WATCHED);
     else
-        isogi_trace__pass_segment(set, s, (size_t)t->values, channels, (const float(*)[3])s->albedo,
+        isogi_trace__pass_segment(set, s, (size_t)t->values, channels, (const float(*)[3])s->albedo, t->feedback->dark,
                                   t->feedback->pass < ISOGI_TRACE__WATCHED);
 }
 
 /* A pass over all probes has ended: whether it was the last. There is one less than reflections (what comes from sky and lights is
-   there before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000.
+   there before them), or there are passes until all that later ones would add, by the ratio of the last two changes, is below 1/1000
+   of every probe's own light: a spot beside a lamp, ever so bright, must not end what is reflected elsewhere (down to a millionth of it).
    The solver comes before that where light fades slowly. Only without memory for it, and where there are ever so many reflections:
    light grows by the same step for ever when 500 passes have not made the step smaller by a fifth. Steps that fall faster, as in rooms
    with a narrow way out, are a series of which MAX_DEPTH passes leave out about 1 % at most. */
 static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
     isogi_trace__set *set = &f->probes;
-    double change = 0, largest = 0;
+    double change = 0, largest = 0, share = 0;
     size_t i;
     for (i = 0; i < set->segment_count; i++) {
+        if (set->segments[i].share > share) share = set->segments[i].share;
         if (set->segments[i].change > change) change = set->segments[i].change;
         if (set->segments[i].largest > largest) largest = set->segments[i].largest;
     }
     set->out = 1 - set->out;
     if (change <= 1e-7 * largest) return 1;
-    if (f->pass > 1 && change < f->before && change * change < 1e-3 * largest * (f->before - change)) return 1;
-    f->before = change;
+    if (f->pass > 2 && share < f->before && share * share < 1e-3 * (f->before - share)) return 1;
+    f->before = share, f->dark = 1e-6 * largest > 1e-37 ? 1e-6 * largest : 1e-37;
     if (f->pass % 500 == 499) {
         f->diverges = t->scene.desc.bounces < 0 && f->pass > 500 && change > 0.8 * f->middle;
         f->middle = change;
@@ -6259,7 +6282,7 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     switch (f->phase) {
     case ISOGI_TRACE__DIRECT:
         f->phase = t->scene.desc.bounces && t->scene.desc.bounces != 1 ? ISOGI_TRACE__PASS : ISOGI_TRACE__CLEAR;
-        f->pass = 1, f->before = f->middle = 0, f->diverges = 0;
+        f->pass = 1, f->before = f->middle = 0, f->dark = 1e-37, f->diverges = 0;
         break;
     case ISOGI_TRACE__PASS:
         if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
@@ -6702,7 +6725,8 @@ static double isogi_trace__open_error(const isogi_trace *t, const float *values,
     int c;
     if (!isogi_trace__finite(error)) return error;
     for (c = 0; c < 3; c++) rgb[c] = 3.5449077018110318 * (double)values[t->scene.desc.transfer_channels == 1 ? 0 : c];
-    light = isogi_trace__luminance(rgb), spread = light * (ISOGI_TRACE__PI - light);
+    light = isogi_trace__luminance(rgb);
+    spread = light * (ISOGI_TRACE__PI * isogi_trace__repeats(t, light / 3.5449077018110318) - light);
     return sqrt(error * error * (spread > 0 ? spread : 0) +
                 isogi_trace__unseen(ISOGI_TRACE__PI, light, error > 0 ? 1 / (error * error) : 1e9));
 }

@@ -571,7 +571,7 @@ static probe seen_along_x(const float *voxel, const size_t size[3], const isogi_
 }
 
 /* Up to 2^24 samples a ray are allowed, and taken. */
-TEST(rays_of_more_than_ten_million_samples) {
+SLOW_TEST(rays_of_more_than_ten_million_samples) {
     static float voxel[4 * 1010];
     const size_t size[3] = {1010, 2, 2};
     const isogi_transfer_point points[2] = {{0, {1, 1, 1}, 0}, {1, {1, 1, 1}, 0.0005f}};
@@ -628,7 +628,7 @@ TEST(matter_between_the_largest_floats) {
 }
 
 /* The least light is that of the sum of sky and lamps, on every path. */
-TEST(lamps_are_added_before_the_least_light) {
+SLOW_TEST(lamps_are_added_before_the_least_light) {
     enum { N = 32 };
     static float voxel[N * N * N], image[16 * 32 * 3];
     const isogi_transfer_point points[4] = {{0.2, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 0.05f}, {0.7, {1, 1, 1}, 0.05f}, {1, {0, 0, 0}, 20}};

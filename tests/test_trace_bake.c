@@ -1479,6 +1479,54 @@ SLOW_TEST(errors_of_what_glows_and_reflects_are_honest) {
     scene_free(&s);
 }
 
+/* Where finite data end in matter, nothing that is not finite passes as matter: a texel or a point there has none, and no light. */
+TEST(what_is_not_finite_is_no_matter_on_the_high_side) {
+    static float voxels[16 * 8 * 8];
+    static const float sky[3] = {3.5449f, 3.5449f, 3.5449f}, points[2][3] = {{8, 4, 4}, {6, 4, 4}};
+    const size_t texel[2][3] = {{8, 4, 4}, {6, 4, 4}};
+    isogi_pyramid *pyramid = NULL;
+    isogi_trace *t = NULL;
+    float e[2][3], error[2];
+    for (int i = 0; i < 16 * 8 * 8; i++) voxels[i] = i % 16 > 8 ? NAN : (float)(i % 16);
+    const isogi_volume v = {.data = voxels, .type = ISOGI_F32, .size = {16, 8, 8}};
+    CHECK(isogi_vol_build(&pyramid, &v, NULL) == ISOGI_OK, "build");
+    const isogi_trace_desc d = {.pyramid = pyramid, .lighting = {.env = {.sh = sky, .sh_order = 1}}, .samples = 16,
+                                .sides = ISOGI_TRACE_HIGH_SIDE};
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
+    CHECK(!isogi_trace_valid(t, texel[0]) && isogi_trace_valid(t, texel[1]), "valid: %d, within %d", isogi_trace_valid(t, texel[0]),
+          isogi_trace_valid(t, texel[1]));
+    CHECK(isogi_trace_gather(&d, points, NULL, 2, e, error, NULL) == ISOGI_OK && e[0][1] <= 0 && isinf(error[0]) && isfinite(error[1]),
+          "E %g +- %g, within %g +- %g", (double)e[0][1], (double)error[0], (double)e[1][1], (double)error[1]);
+    isogi_trace_free(t), isogi_vol_free(pyramid);
+}
+
+/* Transfer that is lit through everything, and reflects: a path brings light at every vertex, and errors know that. */
+TEST(errors_of_transfer_without_shadows_are_bounds) {
+    enum { POINTS = 40, SEEDS = 6 };
+    static float points[POINTS][3], e[SEEDS][POINTS][3], error[POINTS];
+    double q[5] = {12, 12, 12, 16, 7}, spread = 0, told = 0;
+    scene s = scene_make(25, 25, 25, NULL, pit, q);
+    isogi_trace_desc d = desc_make(&s, 0.95f, -1, 64);
+    d.mode = ISOGI_TRACE_TRANSFER, d.order = 3, d.no_shadows = 1, d.lazy = 1;
+    CHECK(surface_points(&s, 0, POINTS, 5, points) == POINTS, "too few points, %d", POINTS);
+    for (int k = 0; k < SEEDS; k++) {
+        isogi_trace *t = NULL;
+        d.seed = (uint64_t)k;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, (const float(*)[3])points, POINTS) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+        isogi_trace_sample(t, (const float(*)[3])points, POINTS, e[k], error);
+        for (int i = 0; i < POINTS; i++) told += (double)error[i] * (double)error[i] / (SEEDS * POINTS);
+        isogi_trace_free(t);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        double mean = 0;
+        for (int k = 0; k < SEEDS; k++) mean += (double)e[k][i][1] / SEEDS;
+        for (int k = 0; k < SEEDS; k++) spread += pow((double)e[k][i][1] - mean, 2) / ((SEEDS - 1) * POINTS);
+    }
+    CHECK(told > 0.7 * spread && told < 30 * spread, "told %g, spread %g", sqrt(told), sqrt(spread));
+    scene_free(&s);
+}
+
 /* The error falls as the sampler promises: independent numbers would give a slope of -1/2 on a log-log plot; a (0,2)-sequence does better
    where the light is smooth (up to -1), and no worse at the shadows' borders. 60 points of a pit and of the plane below a ball, of the
    method that has no bias, and 4 seeds; the slope of a least-squares line over 4 .. 256 samples. */

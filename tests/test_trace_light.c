@@ -632,8 +632,40 @@ TEST(without_shadows_a_closed_ball_is_lit_from_outside) {
     scene_free(&s);
 }
 
+/* A closed ball with a lamp in its middle, below wavy ground in the sun: however bright that is, which reflects little to itself,
+   reflections in the ball go on: E = I / (r^2 (1 - a)), less what its voxels' corners hold. */
+static double ball_below_ground(const double p[3], const double *q) {
+    return fmin(length3(p[0] - q[0], p[1] - q[0], p[2] - q[0]) - q[1], q[2] + 1.5 * sin(0.6 * p[0]) - p[1]);
+}
+TEST(a_bright_place_ends_no_reflections_elsewhere) {
+    enum { POINTS = 40 };
+    double q[3] = {12, 9, 29};
+    scene s = scene_make(25, 35, 25, NULL, ball_below_ground, q);
+    static float points[POINTS][3], e[POINTS][3];
+    double mean[3] = {0, 0, 0};
+    test_random r = {3};
+    for (int i = 0; i < POINTS; i++) {
+        double n[3];
+        random_direction(&r, n);
+        for (int a = 0; a < 3; a++) points[i][a] = (float)(q[0] + q[1] * n[a]);
+    }
+    for (int k = 0; k < 3; k++) {
+        const isogi_light lights[2] = {light_make(ISOGI_LIGHT_POINT, 12, 12, 12, 1, 0),
+                                       light_make(ISOGI_LIGHT_DIRECTIONAL, 0.1f, 1, 0.2f, k ? 1000 : 0.01, 0)};
+        isogi_trace_desc d = desc_make(&s, 0.8f, -1, 16);
+        memset(&d.lighting, 0, sizeof d.lighting), d.lighting.lights = lights, d.lighting.light_count = 2;
+        d.method = ISOGI_TRACE_FEEDBACK, d.isovalue_min = -0.01, d.isovalue_max = 0.01, d.lazy = k == 2;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, POINTS, e);
+        for (int i = 0; i < POINTS; i++) mean[k] += (double)e[i][0] / POINTS;
+    }
+    CHECK(fabs(mean[0] - 5 / 81.0) < 0.1 * 5 / 81, "E %.5f, expected %.5f", mean[0], 5 / 81.0);
+    CHECK(fabs(mean[1] - mean[0]) < 0.01 * mean[0] && fabs(mean[2] - mean[0]) < 0.01 * mean[0], "E %.5f, below a sun of 1000 %.5f, %.5f",
+          mean[0], mean[1], mean[2]);
+    scene_free(&s);
+}
+
 /* A closed white room that glows: n reflections bring n + 1 times what is sent, however many these are, and are no endless light. */
-TEST(thousands_of_reflections_are_no_endless_light) {
+SLOW_TEST(thousands_of_reflections_are_no_endless_light) {
     double q[5] = {8, 8, 8, 5.2, 30};
     scene s = scene_make(17, 17, 17, NULL, shell, q);
     const isogi_albedo_point glow = {0, {1, 1, 1}};

@@ -320,7 +320,7 @@ static void naive_task(void *arg, size_t task) {
         size_t x[3];
         if (brick->state[slot] != ISOGI_TRACE__DONE) continue;
         isogi_trace__texel_of(t, job->brick[task], slot, x);
-        isogi_trace__texel_site(t, x, &site), isogi_trace__site_start(&t->scene, &site);
+        isogi_trace__texel_site(t, x, &site), isogi_trace__site_start(&t->scene, &site, t->scene.high);
         isogi_trace_albedo(&t->scene.desc, site.isovalue, albedo);
         memset(&p, 0, sizeof p);
         p.scene = &t->scene, p.site = &site, p.key = isogi_trace__key(5 + job->run, x[0] + 4096 * (x[1] + 4096 * x[2]));
