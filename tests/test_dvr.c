@@ -916,7 +916,7 @@ TEST(cancelling_leaves_outputs_alone_and_stepping_goes_on) {
     field_free(&f);
 }
 
-TEST(steps_that_are_always_cancelled_get_on) {
+SLOW_TEST(steps_that_are_always_cancelled_get_on) {
     const isogi_transfer_point points[] = {{-0.5, {1, 1, 1}, 0}, {0.5, {1, 1, 1}, 0.3f}};
     const isogi_transfer media = {points, 2, NULL, 0};
     field f = field_waves(40, 6);

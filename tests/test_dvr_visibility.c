@@ -691,7 +691,7 @@ TEST(the_face_of_opaque_matter_is_evenly_lit) {
    both sides, whether values rise or fall: an opaque one shows the light on the side that is seen. A translucent one that scatters
    evenly, of opacity .5, shows (1 - .5^2) / 2 / .5 of a sun before it and .5 log(2) / .5 of one behind, which its grid points know but
    roughly, and by nine harmonics, that overshoot by .15 of the sun. */
-TEST(sheets_are_lit_on_the_side_that_is_seen) {
+SLOW_TEST(sheets_are_lit_on_the_side_that_is_seen) {
     isogi_pyramid *pyramid = linear_field();
     const double slope[3] = {1, 0.37, -0.2}, length = sqrt(1 + 0.37 * 0.37 + 0.2 * 0.2);
     for (int k = 0; k < 8; k++) {

@@ -1291,7 +1291,7 @@ TEST(cancelled_bakes_can_go_on) {
 }
 
 /* Steps that are all cancelled when little is done bring the bake to its end. */
-TEST(steps_that_are_always_cancelled_get_on) {
+SLOW_TEST(steps_that_are_always_cancelled_get_on) {
     double q[5] = {12, 11, 12, 15, 7};
     scene s = scene_make(25, 24, 23, NULL, pit, q);
     float points[100][3], first[100][3], e[100][3];

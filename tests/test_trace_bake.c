@@ -334,7 +334,7 @@ static void count_release(void *user, void *p, size_t size) { (void)size, ((dema
    without a limit runs over a thousand. Nor does a step make or give back all that there is, or move it into a larger place: memory comes
    and goes in few blocks, far below the 2879 that all nodes at once take; a large one, for nodes that are still to come, is taken for
    texels or for probes, and nothing is moved into it. The light is the same bits as in one step. */
-TEST(steps_stay_near_their_budget) {
+SLOW_TEST(steps_stay_near_their_budget) {
     double q[5] = {31.5, 30, 31.5, 36.2, 24};
     scene s = scene_make(64, 64, 64, NULL, pit, q);
     static float points[300][3], e[2][300][3];

@@ -161,7 +161,7 @@ static void compare_all(found *all, const holed *h, int way, const isogi_ray *ra
     }
 }
 
-TEST(rays_past_holes_hit_what_the_plain_walk_hits) {
+SLOW_TEST(rays_past_holes_hit_what_the_plain_walk_hits) {
     test_random r = {71};
     found first = {0, 0}, any = {0, 0}, onward = {0, 0}, bundles = {0, 0};
     for (int turn = 0; turn < (LONG_SUITE ? 6000 : 150); turn++) {
