@@ -3840,7 +3840,8 @@ static void isogi_dvr__classify_row(const isogi_dvr *d, const float *row, size_t
         u = (float)(x - (double)c), next = row[c + (last > 0) - first];
         value = row[c - first] + u * (next - row[c - first]);
         if (!isogi_dvr__finite32(value)) /* a neighbour without weight; or floats whose difference is none */
-            value = u > 0 ? u < 1 ? 2 * (0.5f * row[c - first] + u * (0.5f * next - 0.5f * row[c - first])) : next : row[c - first];
+            value = u > 0 ? u < 1 ? (float)((double)row[c - first] + (double)u * ((double)next - (double)row[c - first])) : next
+                          : row[c - first];
         if (!isogi_dvr__finite32(value)) continue;
         value = (value - low) * scale;
         value = value > 0 ? value : 0;
