@@ -1053,10 +1053,12 @@ TEST(threads_of_a_pool_stay_and_run_every_task_once) {
         isogi_thread_pool_free(context.thread_pool);
         labour_end(l);
     }
+#ifndef ISOGI_NO_THREADS
     isogi_context all = {.threads = -1}; /* 0 or less: all cores */
     isogi_thread_pool *begun = isogi_thread_pool_begin(&all);
     CHECK(begun && all.thread_pool == begun, "a pool for all cores, %d", all.threads);
     isogi_thread_pool_end(&all, begun);
+#endif
     isogi_context few = {.threads = 2}; /* a context's own limit */
     CHECK(isogi_thread_pool_create(&few.thread_pool, 5, NULL) == ISOGI_OK, "pool");
     labour *l = labour_begin(&few);
