@@ -218,13 +218,13 @@
    transparent (rays within its plane do sample it). For sweeps and the paper's method such a voxel alone does not exist: those around it
    keep their shadows. Up to ISOGI_DVR_MAX_PEAKS peaks (in data space, exact or pre-integrated, any number), 2^16 directions, and 2^24
    samples on the longest ray. Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur and
-   on which the transfer function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class: of
-   labels steps belong between values (4.5), since whole regions of exactly a step's value get a part of what begins there. They do where
-   the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and where no voxel
-   is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `scale`
-   and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors:
-   ISOGI_INVALID for anything outside of its documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which),
-   ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   on which the transfer function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class; regions
+   of exactly a step's value, such as labels, have what begins there, if no point is that close. They do where the span of these values is
+   1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and where no voxel is beyond floats; else
+   pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `scale` and `bias` make them of
+   others. With spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors: ISOGI_INVALID for anything outside of
+   its documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which), ISOGI_TOO_LARGE where sizes overflow or pass
+   these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
@@ -1081,6 +1081,30 @@ static void isogi_dvr__class_ends(const isogi_dvr *d, double low, double scale, 
     if (i && i < count - 1) return;
     ends[0] = low + ((double)i + (i ? 0.002 : 0.749)) / scale;
     ends[0] = ends[0] > d->range[0] ? ends[0] : d->range[0], ends[0] = ends[0] < d->range[1] ? ends[0] : d->range[1], ends[1] = ends[0];
+}
+
+/* The next step of a transfer function from its point *next on, classes[0] .. classes[1] that count to its upper side as a whole: that in
+   which it stands, and those before that values exactly at the step may be taken for, as floats are rounded. So labels have all that begins
+   with them; what lies between samples on both sides of a step comes from sums. Not where another point is closer than a few classes. */
+static int isogi_dvr__next_step(const isogi_dvr *d, double low, double scale, size_t count, size_t *next, double *value,
+                                size_t classes[2]) {
+    const isogi_dvr__transfer *t = &d->transfer;
+    const double rounded = (fabs(low - d->volume.bias) + fabs(low - d->base)) * scale + 2 * (double)count, off = 2.4e-7 * rounded;
+    while (*next + 1 < t->point_count) {
+        size_t first = *next, last = first;
+        double at, least = 4 + 2 * off, most = (double)count - 2;
+        *value = t->points[first].value;
+        while (last + 1 < t->point_count && !(t->points[last + 1].value > *value)) last++;
+        *next = last + 1;
+        if (first == last || isogi_dvr__alike(&t->points[first], &t->points[last])) continue;
+        if (first && !((*value - t->points[first - 1].value) * scale >= least)) continue;
+        if (last + 1 < t->point_count && !((t->points[last + 1].value - *value) * scale >= least)) continue;
+        at = (*value - low) * scale;
+        if (!(at >= 1 && at - off < most + 1)) continue;
+        classes[0] = (size_t)(at - off > 1 ? at - off : 1), classes[1] = (size_t)(at < most ? at : most);
+        return 1;
+    }
+    return 0;
 }
 
 /* The class of a value: 0 .. ISOGI_DVR__TABLE - 1. */
@@ -3780,28 +3804,36 @@ static void isogi_dvr__step_task(void *arg, size_t task) {
     }
 }
 
-/* The mean of a transfer function's extinction over every entry's part of the data's range: exact, piece by piece, so that a peak
-   narrower than an entry is not lost. */
-static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABLE]) {
-    const isogi_dvr__transfer *t = &d->transfer;
-    size_t i;
-    for (i = 0; i < ISOGI_DVR__TABLE; i++) {
-        double ends[2], from, to, mean = 0, x, at;
-        size_t next;
-        isogi_dvr__class_ends(d, d->matter.low, d->matter.scale, i, ISOGI_DVR__TABLE, ends);
-        from = x = ends[0], to = ends[1];
-        if (t->point_count && !(to > from)) mean = isogi_dvr__extinction(t->points, t->point_count, from);
-        else if (t->point_count) {
-            at = isogi_dvr__extinction(t->points, t->point_count, x);
-            for (next = isogi_dvr__points_below(t->points, t->point_count, x); next < t->point_count && t->points[next].value < to;
-                 next++) {
-                mean += 0.5 * (at + (double)t->points[next].extinction) * (t->points[next].value - x);
-                x = t->points[next].value, at = (double)t->points[next].extinction;
-            }
-            mean = (mean + 0.5 * (at + isogi_dvr__extinction(t->points, t->point_count, to)) * (to - x)) / (to - from);
-        }
-        table[i] = (float)isogi_dvr__clamp(mean, 1e30);
+/* The mean of a transfer function's extinction over a range of values: exact, piece by piece, so that a peak narrower than a class is not
+   lost. */
+static float isogi_dvr__mean_extinction(const isogi_dvr__transfer *t, double from, double to) {
+    double mean = 0, x = from, at;
+    size_t next;
+    if (!t->point_count) return 0;
+    at = isogi_dvr__extinction(t->points, t->point_count, x);
+    if (!(to > from)) return (float)isogi_dvr__clamp(at, 1e30);
+    for (next = isogi_dvr__points_below(t->points, t->point_count, x); next < t->point_count && t->points[next].value < to; next++) {
+        mean += 0.5 * (at + (double)t->points[next].extinction) * (t->points[next].value - x);
+        x = t->points[next].value, at = (double)t->points[next].extinction;
     }
+    mean = (mean + 0.5 * (at + isogi_dvr__extinction(t->points, t->point_count, to)) * (to - x)) / (to - from);
+    return (float)isogi_dvr__clamp(mean, 1e30);
+}
+
+/* Extinction of the classes. */
+static void isogi_dvr__set_table(const isogi_dvr *d, float table[ISOGI_DVR__TABLE]) {
+    const double low = d->matter.low, scale = d->matter.scale;
+    size_t i, next = 0, classes[2];
+    double ends[2], step;
+    for (i = 0; i < ISOGI_DVR__TABLE; i++) {
+        isogi_dvr__class_ends(d, low, scale, i, ISOGI_DVR__TABLE, ends);
+        table[i] = isogi_dvr__mean_extinction(&d->transfer, ends[0], ends[1]);
+    }
+    while (isogi_dvr__next_step(d, low, scale, ISOGI_DVR__TABLE, &next, &step, classes))
+        for (i = classes[0]; i <= classes[1]; i++) {
+            isogi_dvr__class_ends(d, low, scale, i, ISOGI_DVR__TABLE, ends);
+            table[i] = isogi_dvr__mean_extinction(&d->transfer, step, ends[1]);
+        }
 }
 
 /* Values between four rows of voxels; they count from `low`. */
@@ -6444,42 +6476,50 @@ static void isogi_dvr__sum_classes(isogi_dvr__frame *f) {
             f->classes[i].rest[a] = (float)(sum - f->classes[i].before[a] * (double)f->quantum[a]);
         }
     }
-    for (i = 0; i < f->count; i++) {
-        const isogi_dvr__class_entry *e = &f->classes[i];
-        f->matter[i].before = e->before[3], f->matter[i].rest = e->rest[3], f->matter[i].mean = e->mean[3], f->matter[i].none = 0;
+}
+
+/* The mean over a range of values of extinction times colour, and of extinction. */
+static void isogi_dvr__mean_light(const isogi_dvr__transfer *t, double from, double to, float out[4]) {
+    double x = from, mean[4] = {0, 0, 0, 0};
+    size_t next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
+    int a, half;
+    while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
+        double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to,
+               weight = to > from ? (end - x) / (to - from) : 1;
+        for (half = 0; half < 3; half++) {
+            double at = x + 0.5 * half * (end - x), rgb[3], extinction;
+            if (half == 2 && end > x) { /* just below the end: the upper side of a step is not yet reached */
+                at = x + 0.99999999 * (end - x);
+            }
+            extinction = isogi_dvr__extinction(t->points, t->point_count, at);
+            isogi_dvr__colour(t->points, t->point_count, at, rgb);
+            for (a = 0; a < 4; a++) mean[a] += weight * (half == 1 ? 4.0 : 1.0) / 6 * extinction * (a < 3 ? rgb[a] : 1);
+        }
+        if (!(end < to)) break;
+        x = end, next++;
     }
+    x = mean[3] > 1e30 ? 1e30 / mean[3] : 1; /* sums must stay floats, colours what they are */
+    for (a = 0; a < 4; a++) out[a] = (float)isogi_dvr__clamp(mean[a] * x, 1e32);
 }
 
 static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double scale) {
     const isogi_dvr *d = f->dvr;
-    const isogi_dvr__transfer *t = &d->transfer;
-    size_t i, next;
-    int a, half;
+    size_t i, next = 0, classes[2];
+    double ends[2], step;
     for (i = 0; i < f->count; i++) {
-        isogi_dvr__class_entry *e = &f->classes[i];
-        double ends[2], from, to, x, mean[4] = {0, 0, 0, 0};
         isogi_dvr__class_ends(d, low, scale, i, f->count, ends);
-        from = x = ends[0], to = ends[1];
-        next = t->point_count ? isogi_dvr__points_below(t->points, t->point_count, from) : 0;
-        while (t->point_count) { /* pieces between the function's points: the product of two linear functions, by Simpson's rule exactly */
-            double end = next < t->point_count && t->points[next].value < to ? t->points[next].value : to,
-                   weight = to > from ? (end - x) / (to - from) : 1;
-            for (half = 0; half < 3; half++) {
-                double at = x + 0.5 * half * (end - x), rgb[3], extinction;
-                if (half == 2 && end > x) { /* just below the end: the upper side of a step is not yet reached */
-                    at = x + 0.99999999 * (end - x);
-                }
-                extinction = isogi_dvr__extinction(t->points, t->point_count, at);
-                isogi_dvr__colour(t->points, t->point_count, at, rgb);
-                for (a = 0; a < 4; a++) mean[a] += weight * (half == 1 ? 4.0 : 1.0) / 6 * extinction * (a < 3 ? rgb[a] : 1);
-            }
-            if (!(end < to)) break;
-            x = end, next++;
-        }
-        x = mean[3] > 1e30 ? 1e30 / mean[3] : 1; /* sums must stay floats, colours what they are */
-        for (a = 0; a < 4; a++) e->mean[a] = (float)isogi_dvr__clamp(mean[a] * x, 1e32);
+        isogi_dvr__mean_light(&d->transfer, ends[0], ends[1], f->classes[i].mean);
     }
     isogi_dvr__sum_classes(f);
+    while (isogi_dvr__next_step(d, low, scale, f->count, &next, &step, classes))
+        for (i = classes[0]; i <= classes[1]; i++) {
+            isogi_dvr__class_ends(d, low, scale, i, f->count, ends);
+            isogi_dvr__mean_light(&d->transfer, step, ends[1] > step ? ends[1] : step, f->classes[i].mean);
+        }
+    for (i = 0; i < f->count; i++) {
+        const isogi_dvr__class_entry *e = &f->classes[i];
+        f->matter[i].before = e->before[3], f->matter[i].rest = e->rest[3], f->matter[i].mean = e->mean[3], f->matter[i].none = 0;
+    }
     f->scale = (float)scale, f->value_scale = (float)d->volume.scale, f->value_bias = (float)(d->volume.bias - low);
     if ((double)f->value_bias < d->volume.bias - low) /* the least value that occurs may stand on a step: on its upper side */
         f->value_bias = nextafterf(f->value_bias, 3e38f);

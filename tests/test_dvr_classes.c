@@ -479,6 +479,84 @@ static isogi_volume far_from_zero(int type, double offset, double *doubles, uint
     return v;
 }
 
+/* Slabs across x, each of one label, and a transfer function with a step at every label: a ray within a slab passes the extinction that
+   begins there, and no other. Labels of integers and floats, scaled or not, few or many, near zero or far off. */
+TEST(labels_at_steps_have_all_that_begins_there) {
+    enum { THICK = 4, MOST = 12, LONG = THICK * MOST + 1, DEEP = 17 };
+    static const struct labels { isogi_type type; int slabs; double least, distance, scale, bias; } kinds[] = {
+        {ISOGI_U8, 12, 0, 1, 1, 0},      {ISOGI_U8, 7, 7, 13, 1, 0},         {ISOGI_U8, 3, 200, 20, 1, 0},
+        {ISOGI_I16, 12, -6, 1, 1, 0},    {ISOGI_I16, 9, -2000, 9, 0.37, -3}, {ISOGI_U16, 12, 60000, 1, 1, 0},
+        {ISOGI_U16, 8, 500, 7, 1e-3, 1}, {ISOGI_F32, 6, 0, 1, 1, 0},         {ISOGI_F32, 12, 0.1, 0.1, 1, 0},
+        {ISOGI_F32, 5, 1e4, 1, 1, 0},    {ISOGI_F64, 7, -1 / 3.0, 1 / 7.0, 1, 0}, {ISOGI_F64, 10, 1e-9, 1e-9, 3, 0},
+    };
+    static double data[LONG * DEEP * DEEP];
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+        const struct labels l = kinds[k];
+        const size_t size[3] = {(size_t)(THICK * l.slabs + 1), DEEP, DEEP};
+        const isogi_volume v = {.data = data, .type = l.type, .size = {size[0], DEEP, DEEP}, .scale = l.scale, .bias = l.bias};
+        isogi_transfer_point p[2 * MOST];
+        const isogi_transfer transfer = {p, 2 * (size_t)l.slabs, NULL, 0};
+        isogi_pyramid *pyramid = NULL;
+        for (size_t i = 0; i < size[0] * DEEP * DEEP; i++) {
+            const int slab = (int)(i % size[0]) / THICK;
+            const double raw = l.least + l.distance * (slab < l.slabs ? slab : l.slabs - 1);
+            switch (l.type) {
+            case ISOGI_U8: ((uint8_t *)data)[i] = (uint8_t)raw; break;
+            case ISOGI_I16: ((int16_t *)data)[i] = (int16_t)raw; break;
+            case ISOGI_U16: ((uint16_t *)data)[i] = (uint16_t)raw; break;
+            case ISOGI_F32: ((float *)data)[i] = (float)raw; break;
+            default: data[i] = raw;
+            }
+        }
+        for (int i = 0; i < 2 * l.slabs; i++) {
+            const double raw = l.least + l.distance * (i / 2);
+            const int before = (i - 1) / 2;
+            p[i] = (isogi_transfer_point){(l.type == ISOGI_F32 ? (double)(float)raw : raw) * l.scale + l.bias, {1, 1, 1},
+                                          i ? 0.02f * (float)(1 + before * 5 % 7) : 0};
+            p[i].rgb[0] = i ? (float)(before * 3 % 5) / 4 : 0;
+        }
+        CHECK(isogi_vol_build(&pyramid, &v, &serial) == ISOGI_OK, "build");
+        for (int path = 1; path <= 4; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .opaque = 1};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            for (int i = 0; i < l.slabs; i++) {
+                const double x = THICK * i + 1.5, eye[3] = {x, 8.2, 40}, target[3] = {x, 8.2, 0};
+                const double extinction = 0.02 * (1 + i * 5 % 7), opacity = -expm1(-(DEEP - 1) * extinction), red = i * 3 % 5 / 4.0;
+                const pixel seen = cast(dvr, eye, target, NULL);
+                CHECK(fabs((double)seen.c[3] - opacity) < 1e-4 && fabs((double)seen.c[0] - red * opacity) < 1e-4,
+                      "kind %zu, path %d, label %d: opacity %g of %g, red %g of %g", k, path, i, (double)seen.c[3], opacity,
+                      (double)seen.c[0], red * opacity);
+            }
+            isogi_dvr_free(dvr);
+        }
+        isogi_vol_free(pyramid);
+    }
+}
+
+/* The shadows of labels: matter of one label all around, others in two corners of the box. */
+TEST(labels_at_steps_cast_shadows) {
+    for (int labels = 2; labels < 9; labels++) {
+        field f = field_new(33, 33, 33);
+        const isogi_transfer_point p[4] = {{0, {1, 1, 1}, 0.005f}, {1, {1, 1, 1}, 0.01f}, {1, {1, 1, 1}, 0.05f}, {labels, {1, 1, 1}, 0.2f}};
+        const isogi_transfer transfer = {p, 4, NULL, 0};
+        for (size_t i = 0; i < field_count(&f); i++) f.value[i] = i == 0 ? 0 : i + 1 == field_count(&f) ? labels : 1;
+        field_build(&f);
+        float v[4][COUNT];
+        const float middle[3] = {16, 16, 16};
+        for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                .directions = 32, .grid = {5, 5, 5}};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, &middle, 1, v[method]) == ISOGI_OK, "step");
+            CHECK(fabs((double)v[method][0] / (double)v[ISOGI_DVR_BRUTE][0] - 1) < (method == ISOGI_DVR_PAPER ? 0.15 : 0.03),
+                  "%d labels, method %d: %g of %g", labels, method, (double)v[method][0], (double)v[ISOGI_DVR_BRUTE][0]);
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
+    }
+}
+
 /* What is added to all values and to the transfer function changes nothing: neither pictures nor visibility. */
 TEST(values_far_from_zero_are_told_apart) {
     const double offset[] = {0, 1e6, 1e9};
