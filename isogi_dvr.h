@@ -5547,7 +5547,7 @@ static double isogi_dvr__reach(const isogi_light *light, const double world[3], 
 /* Diffuse, unshadowed, with the smoothed normal turned towards the eye; light from all sides where there is no normal. */
 static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *l, const int cell[3], const double local[3],
                                    const float dir[3], double out[3]) {
-    float normal[3], y[ISOGI_DVR__LOCAL_ORDER * ISOGI_DVR__LOCAL_ORDER];
+    float normal[3], sky[3];
     double n[3], world[3], grid[3], facing = 0;
     isogi_hit hit;
     size_t i;
@@ -5565,9 +5565,8 @@ static void isogi_dvr__shade_local(const isogi_dvr *d, const isogi_dvr__lights *
         out[a] = flat ? l->mean[a] : 0;
     }
     if (!flat && !l->dark) {
-        isogi_sh_eval(y, ISOGI_DVR__LOCAL_ORDER, (const float(*)[3])&normal, 1);
-        for (i = 0; i < ISOGI_SH_COUNT(ISOGI_DVR__LOCAL_ORDER); i++)
-            for (a = 0; a < 3; a++) out[a] += (double)(l->sh[3 * i + (size_t)a] * y[i]) / ISOGI_DVR__PI;
+        isogi_sh_eval_sum(sky, l->sh, ISOGI_DVR__LOCAL_ORDER, 3, (const float(*)[3])&normal, 1);
+        for (a = 0; a < 3; a++) out[a] = (double)sky[a] / ISOGI_DVR__PI;
     }
     for (i = 0; i < l->count; i++) {
         double to[3], irradiance = isogi_dvr__reach(&l->list[i], world, to), cosine = isogi_dvr__dot(to, n);

@@ -59,10 +59,10 @@
 
    Memory       None allocated. Stack use stays below 32 KB (below 60 where the compiler does not optimise).
    Threads      Every function is pure: call them from any thread.
-   Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count. Results that stay
-                in the first-level cache, such as 64 directions at order 11, take half or a third of the time; rows of a structure of
-                arrays that are a multiple of 4096 bytes long take twice as long again, since all functions of a direction compete for
-                the same lines of the cache.
+   Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count; a direction alone
+                takes five times its share of a batch up to order 5, eight times beyond. Results that stay in the first-level cache, such
+                as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of 4096
+                bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 2e-14 at 20, 1.5e-13 at 50,
                 7e-13 at 100 (all near poles, some .01 to .1 off them, for m = 0 and +-1; up to twice as much in x87 registers, as on
@@ -477,6 +477,17 @@ static isogi_sh__unit isogi_sh__normalise(double x, double y, double z) {
         u.z_low = (1 - u.z) - t;
         if (z < 0) u.z = -u.z, u.z_low = -u.z_low;
     }
+    return u;
+}
+
+/* For results in float: squares of floats stay within the range of double, and the low part of z does not show up to order 5. Lengths that
+   differ from 1 by little take no root: the next term is 5/16 e^3. */
+ISOGI_SH__INLINE isogi_sh__unit isogi_sh__normalise_f32(const float d[3]) {
+    isogi_sh__unit u = {0, 0, 1, 0};
+    double x = (double)d[0], y = (double)d[1], z = (double)d[2], square = x * x + y * y + z * z, e = 1 - square, inverse;
+    if (!isogi_sh__finite_f64(square) || square <= 0) return u;
+    inverse = fabs(e) < 1e-3 ? 1 + e * (0.5 + 0.375 * e) : 1 / sqrt(square);
+    u.x = x * inverse, u.y = y * inverse, u.z = z * inverse;
     return u;
 }
 
@@ -1348,6 +1359,46 @@ static void isogi_sh__eval_block(const isogi_sh__output *out, size_t first, int 
             c[k] = x;
         }
     }
+}
+
+/* Orders up to 5 of one direction, unrolled; rest: what is left of z counts, which floats do not show. */
+#define ISOGI_SH__UNROLLED_ORDER 5
+ISOGI_SH__INLINE void isogi_sh__eval_low(double *y, int order, isogi_sh__unit u, int rest) {
+    const double *table = isogi_sh__table_f64;
+    double q[ISOGI_SH__UNROLLED_ORDER], before[ISOGI_SH__UNROLLED_ORDER], c[ISOGI_SH__UNROLLED_ORDER], s[ISOGI_SH__UNROLLED_ORDER];
+    double p = 1, difference = 0, sign = u.z < 0 ? -1 : 1, t = u.z < 0 ? (1 + u.z) + u.z_low : (1 - u.z) - u.z_low;
+    int l, m;
+    c[0] = 1, s[0] = 0, y[0] = table[2];
+    ISOGI_SH__UNROLL
+    for (l = 1; l < ISOGI_SH__UNROLLED_ORDER; l++) {
+        double *centre = y + l * (l + 1);
+        if (l >= order) return;
+        difference = table[3 * l] * difference + table[3 * l + 1] * t * p; /* as in isogi_sh__zonal_column */
+        p += difference;
+        centre[0] = table[3 * l + 2] * (l & 1 ? sign * p : p);
+        c[l] = u.x * c[l - 1] - u.y * s[l - 1], s[l] = u.x * s[l - 1] + u.y * c[l - 1];
+        ISOGI_SH__UNROLL
+        for (m = 1; m <= l; m++) {
+            const double *pair = table + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m) + 2 * (l - m) - 1;
+            if (m < l) {
+                double last = q[m];
+                q[m] = pair[0] * (u.z * last) + (rest ? pair[0] * (u.z_low * last) + pair[1] * before[m] : pair[1] * before[m]);
+                before[m] = last;
+            } else q[m] = pair[1], before[m] = 0;
+            centre[m] = q[m] * c[m], centre[-m] = q[m] * s[m];
+        }
+    }
+}
+
+static void isogi_sh__eval_low_f32(float *y, int order, const float d[3]) {
+    double wide[ISOGI_SH__UNROLLED_ORDER * ISOGI_SH__UNROLLED_ORDER];
+    size_t i;
+    isogi_sh__eval_low(wide, order, isogi_sh__normalise_f32(d), 0);
+    for (i = 0; i < ISOGI_SH_COUNT(order); i++) y[i] = (float)wide[i];
+}
+
+static void isogi_sh__eval_low_f64(double *y, int order, const double d[3]) {
+    isogi_sh__eval_low(y, order, isogi_sh__normalise(d[0], d[1], d[2]), 1);
 }
 
 /* ==== batches on vector units ========================================================================================= */
@@ -2471,6 +2522,50 @@ static size_t isogi_sh__eval_columns_f64(double *out, size_t stride, int order, 
 }
 #endif
 
+/* Directions too few for a batch, whose coordinates stand `step` apart: as many as one vector holds, in whose other lanes the first one
+   stands again. Y_i of direction k goes to out[index i + each k]. How many are done, 0: they are not for vector units. */
+#ifdef ISOGI_SH__VECTORS
+ISOGI_SH__APART size_t isogi_sh__eval_few_f32(float *out, size_t index, size_t each, int order, const float *x, const float *y,
+                                              const float *z, size_t step, size_t count) {
+    float lane[3][8], rows[8 * ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER];
+    size_t i, k, lanes = 4, done;
+    if (order < 3 || order > ISOGI_SH__TABLE_ORDER || !count) return 0;
+#ifdef ISOGI_SH__SIMD
+    if (isogi_sh__level()) lanes = 8;
+#endif
+    for (k = 0; k < lanes; k++) {
+        size_t at = k < count ? k * step : 0;
+        lane[0][k] = x[at], lane[1][k] = y[at], lane[2][k] = z[at];
+    }
+#ifdef ISOGI_SH__SIMD
+    if (lanes == 8) done = isogi_sh__eval_f8(rows, 8, order, lane[0], lane[1], lane[2], 8);
+    else
+#endif
+        done = isogi_sh__eval_f4(rows, 4, order, lane[0], lane[1], lane[2], 4);
+    done = done < count ? done : count;
+    for (k = 0; k < done; k++)
+        for (i = 0; i < ISOGI_SH_COUNT(order); i++) out[index * i + each * k] = rows[lanes * i + k];
+    return done;
+}
+#endif
+#ifdef ISOGI_SH__SIMD
+ISOGI_SH__APART size_t isogi_sh__eval_few_f64(double *out, size_t index, size_t each, int order, const double *x, const double *y,
+                                              const double *z, size_t step, size_t count) {
+    double lane[3][4], rows[4 * ISOGI_SH__TABLE_ORDER * ISOGI_SH__TABLE_ORDER];
+    size_t i, k, done;
+    if (order < 3 || order > ISOGI_SH__TABLE_ORDER || !count || !isogi_sh__level()) return 0;
+    for (k = 0; k < 4; k++) {
+        size_t at = k < count ? k * step : 0;
+        lane[0][k] = x[at], lane[1][k] = y[at], lane[2][k] = z[at];
+    }
+    done = isogi_sh__eval_d4(rows, 4, order, lane[0], lane[1], lane[2], 4);
+    done = done < count ? done : count;
+    for (k = 0; k < done; k++)
+        for (i = 0; i < ISOGI_SH_COUNT(order); i++) out[index * i + each * k] = rows[4 * i + k];
+    return done;
+}
+#endif
+
 /* count * order^2 elements of `size` bytes are addressable; it takes no division where they are at the highest order */
 ISOGI_SH__INLINE int isogi_sh__fits(size_t count, int order, size_t size) {
     return count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(ISOGI_SH_MAX_ORDER) || count <= (size_t)-1 / 2 / size / ISOGI_SH_COUNT(order);
@@ -2481,55 +2576,71 @@ ISOGI_SH__INLINE int isogi_sh__samples_fit(size_t count, int channels, size_t si
     return count <= (size_t)-1 / 2 / size / 16 || count <= (size_t)-1 / 2 / size / (size_t)(channels > 3 ? channels : 3);
 }
 
-ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
+/* Where neither a single direction nor a batch will do. */
+ISOGI_SH__APART void isogi_sh__eval_f32(float *y, int order, const float (*direction)[3], size_t count) {
     isogi_sh__output out = {NULL, 0, 1, 0};
-    size_t i = 0;
+    size_t i = 0, k, lanes, n = ISOGI_SH_COUNT(order);
+    out.data = y;
+    out.direction_stride = n;
+    for (; i < count; i += lanes) {
+        isogi_sh__unit u[ISOGI_SH__LANES];
+        const float *d = direction[i];
+#ifdef ISOGI_SH__VECTORS
+        lanes = isogi_sh__eval_rows_f32(y + i * n, order, direction + i, count - i);
+        if (!lanes) lanes = isogi_sh__eval_few_f32(y + i * n, 1, n, order, d, d + 1, d + 2, 3, count - i);
+        if (lanes) continue;
+#endif
+        lanes = 1;
+        if (order <= ISOGI_SH__UNROLLED_ORDER) isogi_sh__eval_low_f32(y + i * n, order, d);
+        else {
+            for (; i + lanes < count && lanes < ISOGI_SH__LANES; lanes++) {}
+            for (k = 0; k < lanes; k++, d += 3) u[k] = isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]);
+            isogi_sh__eval_block(&out, i, (int)lanes, order, u);
+        }
+    }
+}
+
+ISOGI_API isogi_result isogi_sh_eval(float *y, int order, const float (*direction)[3], size_t count) {
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
-    out.data = y;
-    out.direction_stride = ISOGI_SH_COUNT(order);
-    while (i < count) {
-        isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes;
-#ifdef ISOGI_SH__VECTORS
-        i += isogi_sh__eval_rows_f32(y + i * out.direction_stride, order, direction + i, count - i);
-#endif
-        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
-        for (k = 0; k < lanes; k++) {
-            const float *d = direction[i + (size_t)k];
-            u[k] = isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]);
-        }
-        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
-        i += (size_t)lanes;
-    }
+    if (count != 1 || order > ISOGI_SH__UNROLLED_ORDER) isogi_sh__eval_f32(y, order, direction, count);
+    else isogi_sh__eval_low_f32(y, order, direction[0]);
     return ISOGI_OK;
+}
+
+/* Where neither a single direction nor a batch will do. */
+ISOGI_SH__APART void isogi_sh__eval_f64(double *y, int order, const double (*direction)[3], size_t count) {
+    isogi_sh__output out = {NULL, 0, 1, 1};
+    size_t i = 0, k, lanes, n = ISOGI_SH_COUNT(order);
+    out.data = y;
+    out.direction_stride = n;
+    for (; i < count; i += lanes) {
+        isogi_sh__unit u[ISOGI_SH__LANES];
+        const double *d = direction[i];
+#ifdef ISOGI_SH__SIMD
+        lanes = isogi_sh__eval_rows_f64(y + i * n, order, direction + i, count - i);
+        if (!lanes) lanes = isogi_sh__eval_few_f64(y + i * n, 1, n, order, d, d + 1, d + 2, 3, count - i);
+        if (lanes) continue;
+#endif
+        lanes = 1;
+        if (order <= ISOGI_SH__UNROLLED_ORDER) isogi_sh__eval_low_f64(y + i * n, order, d);
+        else {
+            for (; i + lanes < count && lanes < ISOGI_SH__LANES; lanes++) {}
+            for (k = 0; k < lanes; k++, d += 3) u[k] = isogi_sh__normalise(d[0], d[1], d[2]);
+            isogi_sh__eval_block(&out, i, (int)lanes, order, u);
+        }
+    }
 }
 
 ISOGI_API isogi_result isogi_sh_eval_f64(double *y, int order, const double (*direction)[3], size_t count) {
-    isogi_sh__output out = {NULL, 0, 1, 1};
-    size_t i = 0;
     if (!isogi_sh__order_ok(order) || (count && (!y || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *y)) return ISOGI_TOO_LARGE;
-    out.data = y;
-    out.direction_stride = ISOGI_SH_COUNT(order);
-    while (i < count) {
-        isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes;
-#ifdef ISOGI_SH__SIMD
-        i += isogi_sh__eval_rows_f64(y + i * out.direction_stride, order, direction + i, count - i);
-#endif
-        lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
-        for (k = 0; k < lanes; k++) {
-            const double *d = direction[i + (size_t)k];
-            u[k] = isogi_sh__normalise(d[0], d[1], d[2]);
-        }
-        if (lanes) isogi_sh__eval_block(&out, i, lanes, order, u);
-        i += (size_t)lanes;
-    }
+    if (count != 1 || order > ISOGI_SH__UNROLLED_ORDER) isogi_sh__eval_f64(y, order, direction, count);
+    else isogi_sh__eval_low_f64(y, order, direction[0]);
     return ISOGI_OK;
 }
 
-/* directions from i on, those first that are not for vector units */
+/* directions from i on, where no batch begins */
 ISOGI_SH__APART isogi_result isogi_sh__eval_soa(void *basis, int is_double, int order, const void *x, const void *y, const void *z,
                                                 size_t i, size_t count) {
     isogi_sh__output out = {NULL, 1, 0, 0};
@@ -2537,26 +2648,30 @@ ISOGI_SH__APART isogi_result isogi_sh__eval_soa(void *basis, int is_double, int 
     out.index_stride = count;
     out.is_double = is_double;
     while (i < count) {
+        const float *x32 = (const float *)x + i, *y32 = (const float *)y + i, *z32 = (const float *)z + i;
+        const double *x64 = (const double *)x + i, *y64 = (const double *)y + i, *z64 = (const double *)z + i;
         isogi_sh__unit u[ISOGI_SH__LANES];
-        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
-        for (k = 0; k < lanes; k++) {
-            size_t j = i + (size_t)k;
-            if (is_double) u[k] = isogi_sh__normalise(((const double *)x)[j], ((const double *)y)[j], ((const double *)z)[j]);
-            else
-                u[k] = isogi_sh__normalise((double)((const float *)x)[j], (double)((const float *)y)[j], (double)((const float *)z)[j]);
-        }
-        isogi_sh__eval_block(&out, i, lanes, order, u);
-        i += (size_t)lanes;
+        size_t lanes = count - i < ISOGI_SH__LANES ? count - i : ISOGI_SH__LANES, few = 0, k;
 #ifdef ISOGI_SH__VECTORS
-        if (!is_double)
-            i += isogi_sh__eval_columns_f32((float *)basis + i, count, order, (const float *)x + i, (const float *)y + i,
-                                            (const float *)z + i, count - i);
+        if (!is_double) {
+            few = isogi_sh__eval_columns_f32((float *)basis + i, count, order, x32, y32, z32, count - i);
+            if (!few) few = isogi_sh__eval_few_f32((float *)basis + i, count, 1, order, x32, y32, z32, 1, count - i);
+        }
 #endif
 #ifdef ISOGI_SH__SIMD
-        if (is_double)
-            i += isogi_sh__eval_columns_f64((double *)basis + i, count, order, (const double *)x + i, (const double *)y + i,
-                                            (const double *)z + i, count - i);
+        if (is_double) {
+            few = isogi_sh__eval_columns_f64((double *)basis + i, count, order, x64, y64, z64, count - i);
+            if (!few) few = isogi_sh__eval_few_f64((double *)basis + i, count, 1, order, x64, y64, z64, 1, count - i);
+        }
 #endif
+        if (few) lanes = few;
+        else {
+            for (k = 0; k < lanes; k++)
+                u[k] = is_double ? isogi_sh__normalise(x64[k], y64[k], z64[k])
+                                 : isogi_sh__normalise((double)x32[k], (double)y32[k], (double)z32[k]);
+            isogi_sh__eval_block(&out, i, (int)lanes, order, u);
+        }
+        i += lanes;
     }
     return ISOGI_OK;
 }
@@ -2642,10 +2757,41 @@ ISOGI_API isogi_result isogi_sh_eval_gradient_f64(double (*gradient)[3], int ord
 
 /* ==== sums and zonal lobes =========================================================================================== */
 
-/* value[channel] = sum over i of c[channels i + channel] Y_i(u), nothing stored on the way; channels <= ISOGI_SH__CHANNELS */
+/* value[k] = sum over i of c[channels i + k] y[i], for three channels */
+ISOGI_SH__INLINE void isogi_sh__three_products(double *value, const double *y, const void *c, int is_double, int count) {
+    double a = 0, b = 0, d = 0;
+    int i;
+    for (i = 0; i < count; i++, y++) {
+        a += isogi_sh__get(c, is_double, 3 * i) * *y;
+        b += isogi_sh__get(c, is_double, 3 * i + 1) * *y;
+        d += isogi_sh__get(c, is_double, 3 * i + 2) * *y;
+    }
+    value[0] = a, value[1] = b, value[2] = d;
+}
+
+/* The same for any channels. */
+static void isogi_sh__products(double *value, const double *y, const void *c, int is_double, int count, int channels) {
+    int i, k;
+    if (channels == 3 && is_double) isogi_sh__three_products(value, y, c, 1, count);
+    else if (channels == 3) isogi_sh__three_products(value, y, c, 0, count);
+    else
+        for (k = 0; k < channels; k++) {
+            double sum = 0;
+            for (i = 0; i < count; i++) sum += isogi_sh__get(c, is_double, channels * i + k) * y[i];
+            value[k] = sum;
+        }
+}
+
+/* value[channel] = sum over i of c[channels i + channel] Y_i(u), channels <= ISOGI_SH__CHANNELS */
 static void isogi_sh__sum(double *value, const void *c, int is_double, int order, int channels, isogi_sh__unit u) {
     double q[ISOGI_SH_MAX_ORDER], cm = 1, sm = 0, diagonal = 0, x;
     int l, m, k;
+    if (order <= ISOGI_SH__UNROLLED_ORDER) {
+        double y[ISOGI_SH__UNROLLED_ORDER * ISOGI_SH__UNROLLED_ORDER];
+        isogi_sh__eval_low(y, order, u, 1);
+        isogi_sh__products(value, y, c, is_double, order * order, channels);
+        return;
+    }
     for (k = 0; k < channels; k++) value[k] = 0;
     for (m = 0; m < order; m++) {
         diagonal = isogi_sh__next_diagonal(diagonal, m);
@@ -2663,39 +2809,56 @@ static void isogi_sh__sum(double *value, const void *c, int is_double, int order
     }
 }
 
+/* Of up to 4 directions; vector units evaluate all functions of low orders first. */
+#define ISOGI_SH__SUMS 4
+static void isogi_sh__sums(double *value, const void *c, int is_double, int order, int channels, const double (*direction)[3],
+                           size_t count) {
+    size_t k;
+#ifdef ISOGI_SH__SIMD
+    double y[ISOGI_SH__SUMS * ISOGI_SH__LOW_ORDER * ISOGI_SH__LOW_ORDER];
+    size_t n = ISOGI_SH_COUNT(order);
+    int least = count < ISOGI_SH__SUMS ? ISOGI_SH__UNROLLED_ORDER + 1 : 3;
+    if (order >= least && order <= ISOGI_SH__LOW_ORDER && isogi_sh__level()) {
+        isogi_sh__eval_f64(y, order, direction, count);
+        for (k = 0; k < count; k++)
+            isogi_sh__products(value + k * (size_t)channels, y + k * n, c, is_double, order * order, channels);
+        return;
+    }
+#endif
+    for (k = 0; k < count; k++)
+        isogi_sh__sum(value + k * (size_t)channels, c, is_double, order, channels,
+                      isogi_sh__normalise(direction[k][0], direction[k][1], direction[k][2]));
+}
+
 ISOGI_API isogi_result isogi_sh_eval_sum(float *value, const float *c, int order, int channels, const float (*direction)[3], size_t count) {
-    double sum[ISOGI_SH__CHANNELS];
-    size_t i;
-    int k;
+    double sum[ISOGI_SH__SUMS * ISOGI_SH__CHANNELS], wide[ISOGI_SH__SUMS][3];
+    size_t i, k, some;
 #ifdef ISOGI_SH__SIMD
     int level = order >= 3 && order <= ISOGI_SH__TABLE_ORDER && count >= 8 ? isogi_sh__level() : 0;
 #endif
     if (!isogi_sh__shape_ok(order, channels) || !c || (count && (!value || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
-    for (i = 0; i < count; i++) {
-        const float *d = direction[i];
+    for (i = 0; i < count; i += some) {
 #ifdef ISOGI_SH__SIMD
-        if (level && count - i >= 8 && isogi_sh__sum_rows_f32(value + i * (size_t)channels, c, order, channels, direction + i)) {
-            i += 7;
-            continue;
-        }
+        some = 8;
+        if (level && count - i >= some && isogi_sh__sum_rows_f32(value + i * (size_t)channels, c, order, channels, direction + i)) continue;
 #endif
-        isogi_sh__sum(sum, c, 0, order, channels, isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]));
-        for (k = 0; k < channels; k++) value[i * (size_t)channels + (size_t)k] = (float)sum[k];
+        some = count - i < ISOGI_SH__SUMS ? count - i : ISOGI_SH__SUMS;
+        for (k = 0; k < 3 * some; k++) wide[k / 3][k % 3] = (double)direction[i + k / 3][k % 3];
+        isogi_sh__sums(sum, c, 0, order, channels, (const double(*)[3])wide, some);
+        for (k = 0; k < some * (size_t)channels; k++) value[i * (size_t)channels + k] = (float)sum[k];
     }
     return ISOGI_OK;
 }
 
 ISOGI_API isogi_result isogi_sh_eval_sum_f64(double *value, const double *c, int order, int channels, const double (*direction)[3],
                                              size_t count) {
-    double sum[ISOGI_SH__CHANNELS];
-    size_t i;
-    int k;
+    size_t i, some;
     if (!isogi_sh__shape_ok(order, channels) || !c || (count && (!value || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
-    for (i = 0; i < count; i++) {
-        isogi_sh__sum(sum, c, 1, order, channels, isogi_sh__normalise(direction[i][0], direction[i][1], direction[i][2]));
-        for (k = 0; k < channels; k++) value[i * (size_t)channels + (size_t)k] = sum[k];
+    for (i = 0; i < count; i += some) {
+        some = count - i < ISOGI_SH__SUMS ? count - i : ISOGI_SH__SUMS;
+        isogi_sh__sums(value + i * (size_t)channels, c, 1, order, channels, direction + i, some);
     }
     return ISOGI_OK;
 }
@@ -3994,42 +4157,15 @@ ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order) {
     return ISOGI_OK;
 }
 
-/* For results in float: squares of floats stay within the range of double, and the low part of z would not show at order 5. */
-static isogi_sh__unit isogi_sh__normalise_f32(const float d[3]) {
-    isogi_sh__unit u = {0, 0, 1, 0};
-    double x = (double)d[0], y = (double)d[1], z = (double)d[2], square = x * x + y * y + z * z, inverse;
-    if (!isogi_sh__finite_f64(square) || square <= 0) return u;
-    inverse = 1 / sqrt(square);
-    u.x = x * inverse, u.y = y * inverse, u.z = z * inverse;
-    return u;
-}
-
-/* Order 5, unrolled: the recursion of the basis with the lobe's factors instead of a sum over channels. */
-static void isogi_sh__zonal_order5(float *c, const float *zonal, isogi_sh__unit u) {
-    static const double factor[5] = {3.5449077018110321, 2.0466534158929770, 1.5853309190424045, 1.3398491713813586, 1.1816359006036774};
-    double scale[5], cm = 1, sm = 0, z = u.z + u.z_low, t;
-    const double *table = isogi_sh__table_f64;
-    int l, m;
-    ISOGI_SH__UNROLL
-    for (l = 0; l < 5; l++) scale[l] = factor[l] * (double)zonal[l];
-    c[0] = (float)(scale[0] * table[2]);
-    c[2] = (float)(scale[1] * table[5] * z);
-    c[6] = (float)(scale[2] * table[8] * (1.5 * z * z - 0.5));
-    c[12] = (float)(scale[3] * table[11] * z * (2.5 * z * z - 1.5));
-    c[20] = (float)(scale[4] * table[14] * ((4.375 * z * z - 3.75) * z * z + 0.375));
-    ISOGI_SH__UNROLL
-    for (m = 1; m < 5; m++) {
-        const double *pair = table + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m);
-        double q = *pair++, before = 0;
-        t = u.x * cm - u.y * sm;
-        sm = u.x * sm + u.y * cm;
-        cm = t;
-        ISOGI_SH__UNROLL
-        for (l = m; l < 5; l++) {
-            if (l > m) t = pair[0] * (z * q) + pair[1] * before, before = q, q = t, pair += 2;
-            c[l * (l + 1) + m] = (float)(scale[l] * q * cm);
-            c[l * (l + 1) - m] = (float)(scale[l] * q * sm);
-        }
+static void isogi_sh__zonal_low(float *c, int order, const float *zonal, const float d[3]) {
+    static const double factor[ISOGI_SH__UNROLLED_ORDER] = {3.5449077018110321, 2.0466534158929770, 1.5853309190424045,
+                                                            1.3398491713813586, 1.1816359006036774};
+    double y[ISOGI_SH__UNROLLED_ORDER * ISOGI_SH__UNROLLED_ORDER];
+    int l, i;
+    isogi_sh__eval_low(y, order, isogi_sh__normalise_f32(d), 0);
+    for (l = i = 0; l < order; l++) {
+        double scale = factor[l] * (double)zonal[l];
+        for (; i < (l + 1) * (l + 1); i++) c[i] = (float)(scale * y[i]);
     }
 }
 
@@ -4038,8 +4174,8 @@ ISOGI_SH__APART isogi_result isogi_sh__zonal_to_direction(float *c, int order, c
     double scale[ISOGI_SH_MAX_ORDER], one = 1;
     int l, i;
     if (!c || !zonal || !direction || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
-    if (order == 5) {
-        isogi_sh__zonal_order5(c, zonal, isogi_sh__normalise_f32(direction));
+    if (order <= ISOGI_SH__UNROLLED_ORDER) {
+        isogi_sh__zonal_low(c, order, zonal, direction);
         return ISOGI_OK;
     }
     for (l = 0; l < order; l++) scale[l] = isogi_sh__zonal_factor(l) * (double)zonal[l];
@@ -6243,6 +6379,8 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__PI
 #undef ISOGI_SH__SIMD
 #undef ISOGI_SH__TABLE_ORDER
+#undef ISOGI_SH__UNROLLED_ORDER
+#undef ISOGI_SH__SUMS
 #undef ISOGI_SH__SPLIT
 #undef ISOGI_SH__AVX2
 #undef ISOGI_SH__IN_ORDER

@@ -259,6 +259,68 @@ TEST(batches_are_exact_at_every_level) {
     instruction_level = BEST_LEVEL;
 }
 
+/* Few directions go other ways than batches: every count up to 20 at every level, rows, columns and sums, with directions of any length
+   and, in some rounds, one without a direction among them. */
+TEST(any_count_of_directions_is_exact_at_every_level) {
+    enum { MOST = 20 };
+    static const struct { int order; double bound, bound64; } cases[] = {{1, 1e-7, 1e-16}, {2, 1e-7, 3e-16}, {3, 4.5e-7, 1e-15},
+        {4, 4.5e-7, 1e-15}, {5, 4.5e-7, 1e-15}, {6, 2.2e-6, 5e-15}, {11, 2.2e-6, 5e-15}, {21, 1e-5, 2e-14}, {22, 3e-7, 2e-13}};
+    static float d[MOST][3], soa[3][MOST], y[MOST * 484], columns[MOST * 484], c32[3 * 484], sums[MOST * 3];
+    static double wide[MOST][3], soa64[3][MOST], y64[MOST * 484], columns64[MOST * 484], c64[3 * 484], sums64[MOST * 3];
+    static quad expected[MOST][484];
+    test_random r = {47};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const int order = cases[c].order, n = order * order;
+        double worst = 0, worst64 = 0, off = 0, off64 = 0, total = 0;
+        for (int i = 0; i < 3 * n; i++) c32[i] = rounded(random_range(&r, -1, 1)), c64[i] = (double)c32[i], total += fabs(c64[i]) / 3;
+        for (int round = 0; round < 2; round++) {
+            for (int i = 0; i < MOST; i++) {
+                random_direction(&r, wide[i]);
+                for (int k = 0; k < 3; k++) {
+                    if (i % 3) wide[i][k] *= i % 3 == 1 ? 1 + 5e-4 : 3e6;
+                    if (round && i == 7) wide[i][k] = 0;
+                    wide[i][k] = (double)(d[i][k] = rounded(wide[i][k])), soa[k][i] = d[i][k], soa64[k][i] = wide[i][k];
+                }
+                const quad e[3] = {(quad)wide[i][0], (quad)wide[i][1], round && i == 7 ? 1 : (quad)wide[i][2]};
+                reference_eval(expected[i], order, e);
+            }
+            for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++)
+                for (int count = 1; count <= MOST; count++)
+                    for (int first = 0; first < (round ? 8 : 1); first += 7) { /* from the one without a direction on, too */
+                        const int last = first + count <= MOST ? first + count : MOST;
+                        const size_t some = (size_t)(last - first);
+                        isogi_sh_eval(y, order, (const float(*)[3])d + first, some);
+                        isogi_sh_eval_f64(y64, order, (const double(*)[3])wide + first, some);
+                        isogi_sh_eval_soa(columns, order, soa[0] + first, soa[1] + first, soa[2] + first, some);
+                        isogi_sh_eval_soa_f64(columns64, order, soa64[0] + first, soa64[1] + first, soa64[2] + first, some);
+                        isogi_sh_eval_sum(sums, c32, order, 3, (const float(*)[3])d + first, some);
+                        isogi_sh_eval_sum_f64(sums64, c64, order, 3, (const double(*)[3])wide + first, some);
+                        for (size_t i = 0; i < some; i++) {
+                            double sum[3] = {0, 0, 0};
+                            for (int k = 0; k < n; k++) {
+                                const double exact = (double)expected[(size_t)first + i][k];
+                                worst = fmax(worst, fabs((double)y[i * (size_t)n + (size_t)k] - exact));
+                                worst = fmax(worst, fabs((double)columns[(size_t)k * some + i] - exact));
+                                worst64 = fmax(worst64, fabs(y64[i * (size_t)n + (size_t)k] - exact));
+                                worst64 = fmax(worst64, fabs(columns64[(size_t)k * some + i] - exact));
+                                for (int j = 0; j < 3; j++) sum[j] += exact * c64[3 * k + j];
+                            }
+                            for (size_t j = 0; j < 3; j++) {
+                                off = fmax(off, fabs((double)sums[3 * i + j] - sum[j]));
+                                off64 = fmax(off64, fabs(sums64[3 * i + j] - sum[j]));
+                            }
+                        }
+                    }
+        }
+        printf("    order %2d: %.3g in float, %.3g in double; sums %.3g, %.3g\n", order, worst, worst64, off, off64);
+        CHECK(worst <= cases[c].bound * ROUNDING_FACTOR, "order %d: float %g", order, worst);
+        CHECK(worst64 <= cases[c].bound64 * ROUNDING_FACTOR, "order %d: double %g", order, worst64);
+        CHECK(off <= (cases[c].bound + 6e-8) * total * ROUNDING_FACTOR, "order %d: sums %g", order, off);
+        CHECK(off64 <= cases[c].bound64 * total * ROUNDING_FACTOR, "order %d: sums in double %g", order, off64);
+    }
+    instruction_level = BEST_LEVEL;
+}
+
 /* Floats against doubles of the plain code, which the tests above compare with 128 bits: cheap, so that many directions are seen.
    Bounds are those of the next degree that the header names. */
 TEST(floats_are_exact_at_many_directions) {

@@ -121,18 +121,24 @@ static void row(const bench_case *c, const char *method) {
 
 /* times: of random directions, which come after the hard ones */
 static void run_aos_f32(int order, size_t count) { isogi_sh_eval(basis, order, (const float(*)[3])directions + HARD, count); }
+static void run_one_f32(int order, size_t count) { /* one direction a call */
+    for (size_t i = 0; i < count; i++)
+        isogi_sh_eval(basis + i * (size_t)(order * order), order, (const float(*)[3])directions + HARD + i, 1);
+}
 static void run_soa_f32(int order, size_t count) { isogi_sh_eval_soa(basis, order, soa[0] + HARD, soa[1] + HARD, soa[2] + HARD, count); }
 static void run_aos_f64(int order, size_t count) { isogi_sh_eval_f64(basis64, order, (const double(*)[3])directions64 + HARD, count); }
 
 /* errors: over all of them */
-static double error_of_basis(int order, size_t count, int is_double, int is_soa) {
+static double error_of_basis(int order, size_t count, int is_double, int is_soa, int one_a_call) {
     static quad expected[MAX_N];
     double worst = 0;
     size_t n = (size_t)(order * order);
     count = quick ? 256 : MAX_COUNT;
     if (is_double) isogi_sh_eval_f64(basis64, order, (const double(*)[3])directions64, count);
     else if (is_soa) isogi_sh_eval_soa(basis, order, soa[0], soa[1], soa[2], count);
-    else isogi_sh_eval(basis, order, (const float(*)[3])directions, count);
+    else if (!one_a_call) isogi_sh_eval(basis, order, (const float(*)[3])directions, count);
+    else
+        for (size_t i = 0; i < count; i++) isogi_sh_eval(basis + i * n, order, (const float(*)[3])directions + i, 1);
     for (size_t i = 0; i < count; i++) {
         quad d[3];
         for (int k = 0; k < 3; k++) d[k] = is_double ? (quad)directions64[i][k] : (quad)directions[i][k];
@@ -155,9 +161,10 @@ static void fill_row(const bench_case *c) {
     fprintf(stderr, "  %-20s %-8s %11.2f\n", c->name, "fill", seconds / (double)c->count * 1e9);
 }
 
-static double error_aos_f32(int order, size_t count) { return error_of_basis(order, count, 0, 0); }
-static double error_soa_f32(int order, size_t count) { return error_of_basis(order, count, 0, 1); }
-static double error_aos_f64(int order, size_t count) { return error_of_basis(order, count, 1, 0); }
+static double error_one_f32(int order, size_t count) { return error_of_basis(order, count, 0, 0, 1); }
+static double error_aos_f32(int order, size_t count) { return error_of_basis(order, count, 0, 0, 0); }
+static double error_soa_f32(int order, size_t count) { return error_of_basis(order, count, 0, 1, 0); }
+static double error_aos_f64(int order, size_t count) { return error_of_basis(order, count, 1, 0, 0); }
 
 /* ---- rotation: the reference evaluates the input at the direction rotated back, for poles, axes, directions 1e-8 off them and 32
    random ones, and the output at the direction ---- */
@@ -545,6 +552,8 @@ int main(int argc, char **argv) {
         {"eval-aos-f32-L4", "direction", run_aos_f32, error_aos_f32, 5, 128, 3.6, 2, 4.5e-7},
         {"eval-aos-f32-L10", "direction", run_aos_f32, error_aos_f32, 11, 32, 35, 12, 2.2e-6},
         {"eval-aos-f32-L20", "direction", run_aos_f32, error_aos_f32, 21, 16, 148, 60, 1e-5},
+        {"eval-one-f32-L2", "direction", run_one_f32, error_one_f32, 3, 64, 0, 15, 4.5e-7},
+        {"eval-one-f32-L4", "direction", run_one_f32, error_one_f32, 5, 64, 0, 30, 4.5e-7},
         {"eval-soa-f32-L4", "direction", run_soa_f32, error_soa_f32, 5, 128, 1.5, 0.9, 4.5e-7},
         {"eval-soa-f32-L10", "direction", run_soa_f32, error_soa_f32, 11, 32, 9.3, 3.5, 2.2e-6},
         {"eval-soa-f32-L20", "direction", run_soa_f32, error_soa_f32, 21, 16, 49, 20, 1e-5},
@@ -590,7 +599,7 @@ int main(int argc, char **argv) {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         if (!chosen(cases[i].name)) continue;
         row(&cases[i], "default");
-        if (!strncmp(cases[i].name, "eval", 4)) fill_row(&cases[i]);
+        if (!strncmp(cases[i].name, "eval", 4) && cases[i].run != run_one_f32) fill_row(&cases[i]);
         if (quick) continue;
         for (bench_level = 0; bench_level < 2; bench_level++) row(&cases[i], bench_level ? "avx2" : "plain");
         bench_level = 99;
