@@ -1793,9 +1793,18 @@ static int isogi_dvr__float_classes(const isogi_dvr *d, double scale) {
     return fabs(d->range[0] - d->base) <= ISOGI_DVR__FLOATS && fabs(d->range[1] - d->base) <= ISOGI_DVR__FLOATS;
 }
 
+/* Whether floats that count from `base`, as blocks of the paper's method hold values, tell these apart to a few classes. */
+static int isogi_dvr__blocks_tell(const isogi_dvr *d) {
+    const isogi_dvr__matter *m = &d->matter;
+    const double from = fabs(m->low - d->base), to = fabs(m->low + ISOGI_DVR__TABLE / m->scale - d->base);
+    if (d->volume.type != ISOGI_F64 && !(fabs(d->volume.bias) > 0)) return 1; /* integers, or floats as they are */
+    return (from > to ? from : to) * m->scale <= 134217728;
+}
+
 /* The method at work: nor do these know values beyond floats. */
 static isogi_dvr_method isogi_dvr__method_now(const isogi_dvr *d) {
-    return isogi_dvr__float_classes(d, d->matter.scale) ? isogi_dvr__method(d) : ISOGI_DVR_BRUTE;
+    const isogi_dvr_method method = isogi_dvr__float_classes(d, d->matter.scale) ? isogi_dvr__method(d) : ISOGI_DVR_BRUTE;
+    return method == ISOGI_DVR_PAPER && !isogi_dvr__blocks_tell(d) ? ISOGI_DVR_BRUTE : method;
 }
 
 ISOGI_API isogi_result isogi_dvr_set_transfer(isogi_dvr *dvr, const isogi_transfer *transfer) {

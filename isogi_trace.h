@@ -585,7 +585,8 @@ ISOGI_API size_t isogi_trace_memory(const isogi_trace *trace); /* bytes that the
 #define ISOGI_TRACE__WATCHED 6       /* passes that look for probes whose light has settled */
 #define ISOGI_TRACE__PASSES 100      /* after which all that they would still add is worked out at once, */
 #define ISOGI_TRACE__ROUNDS 2000     /* in so many rounds at most, */
-#define ISOGI_TRACE__RESIDUAL 1e-6   /* until one more reflection changes no more than this share of the largest light */
+#define ISOGI_TRACE__RESIDUAL 1e-9   /* until one more reflection changes no more than this share of the largest light: 1/1000 of a
+                                        millionth of it, as passes are */
 #define ISOGI_TRACE__PROBE_ERROR 0.02 /* standard error of light from probes */
 #define ISOGI_TRACE__CELL 2.0       /* of probes that texels read, in voxels, */
 #define ISOGI_TRACE__CELL_LEAST 1.0 /* down to this where lights throw shadows and there are more samples than */
@@ -1330,9 +1331,13 @@ static void isogi_trace__block_range(const isogi_pyramid *pyramid, const size_t 
 
 /* A table at a value. */
 static void isogi_trace__colour(const isogi_albedo_point *p, size_t n, double isovalue, float rgb[3]) {
-    size_t i = 0;
+    size_t i = 0, end = n;
     int c;
-    while (i < n && p[i].value < isovalue) i++;
+    while (i < end) { /* the first point that is not below; all are not below what is NaN */
+        size_t middle = i + (end - i) / 2;
+        if (p[middle].value < isovalue) i = middle + 1;
+        else end = middle;
+    }
     for (c = 0; c < 3; c++)
         rgb[c] = i == 0 || i == n ? p[i ? n - 1 : 0].rgb[c]
                                   : (float)isogi_trace__lerp((double)p[i - 1].rgb[c], (double)p[i].rgb[c],
@@ -3594,7 +3599,7 @@ static isogi_result isogi_trace__learn_points(isogi_trace *t, const isogi_trace_
 static isogi_result isogi_trace__want_points(isogi_trace *t, isogi_trace__asked *asked, size_t first, size_t end) {
     size_t i;
     for (i = first; i < end; i++) {
-        size_t cell[3], brick[64];
+        size_t cell[3], texel[3], brick[64];
         uint32_t slot[64];
         uint8_t tap[64];
         double local[3];
@@ -3604,8 +3609,11 @@ static isogi_result isogi_trace__want_points(isogi_trace *t, isogi_trace__asked 
         taps = isogi_trace__asked_taps(t, asked, i, cell, local, tap, brick, slot);
         if (!taps) continue;
         for (k = 0; k < taps && result == ISOGI_OK; k++) {
-            if (t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__READABLE) result = isogi_trace__want_slot(t, brick[k], slot[k]);
-            lacking = lacking && t->bricks[brick[k]]->state[slot[k]] == ISOGI_TRACE__NO_SURFACE;
+            int state = t->bricks[brick[k]]->state[slot[k]];
+            int within = isogi_trace__texel_of(t, brick[k], slot[k], texel) && isogi_trace__in_box(t, texel);
+            if (state == ISOGI_TRACE__READABLE) result = isogi_trace__want_slot(t, brick[k], slot[k]);
+            /* beyond the box, only what was loaded is read */
+            lacking = lacking && (state == ISOGI_TRACE__NO_SURFACE || (!within && state < ISOGI_TRACE__DRAFT));
         }
         asked->lacking |= lacking;
         if (result == ISOGI_OK && lacking) {
@@ -5281,7 +5289,7 @@ static int isogi_trace__pass_end(isogi_trace *t) {
         if (set->segments[i].largest > largest) largest = set->segments[i].largest;
     }
     set->out = 1 - set->out;
-    if (change <= 1e-7 * largest) return 1;
+    if (share <= 1e-6) return 1;
     if (f->pass > 2 && share < f->before && share * share < 1e-3 * (f->before - share)) return 1;
     f->before = share, f->dark = 1e-6 * largest > 1e-37 ? 1e-6 * largest : 1e-37;
     if (f->pass % 500 == 499) {

@@ -581,7 +581,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #include <emmintrin.h>
 #endif
 /* gcc for Windows does not align its stack for 32-byte vectors: no wide paths there */
-#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && !defined(_WIN32))) && \
+#if defined(ISOGI_VOL__SSE2) && defined(__x86_64__) && (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 8 && !defined(_WIN32))) && \
     !defined(__TINYC__)
 #define ISOGI_VOL__AVX
 #define ISOGI_VOL__TARGET(features) __attribute__((target(features)))
@@ -9322,8 +9322,8 @@ static unsigned isogi_vol__edge_faces(int edge) {
 
 /* The corners of a face, i = 0..3, counter-clockwise seen from outside of the cell; any i is taken modulo 4. */
 static int isogi_vol__face_corner(int face, int i) {
-    int axis = face >> 1, s = face & 1 ? i & 3 : 3 - (i & 3);
-    return (face & 1) << axis | (s == 1 || s == 2) << ((axis + 1) % 3) | (s >> 1) << ((axis + 2) % 3);
+    static const uint8_t corner[6][4] = {{4, 6, 2, 0}, {1, 3, 7, 5}, {1, 5, 4, 0}, {2, 6, 7, 3}, {2, 3, 1, 0}, {4, 5, 7, 6}};
+    return corner[face][i & 3];
 }
 
 /* A power of two that brings numbers of the size `most` to where their products neither overflow nor vanish; 1 if they are there. */
@@ -9354,7 +9354,7 @@ static int isogi_vol__face_alternates(unsigned code, int face) {
 
 static void isogi_vol__merge(int region[8], int a, int b) {
     int from = region[a], to = region[b], i;
-    for (i = 0; i < 8; i++)
+    for (i = 0; from != to && i < 8; i++)
         if (region[i] == from) region[i] = to;
 }
 

@@ -596,6 +596,39 @@ TEST(values_far_from_zero_are_told_apart) {
         }
 }
 
+/* A ball far from zero, and one voxel on the other side of zero: doubles tell its values apart, floats that count from zero do not. */
+TEST(a_voxel_beyond_zero_takes_no_digits_from_the_others) {
+    static double data[33 * 33 * 33];
+    const isogi_volume volume = {.data = data, .type = ISOGI_F64, .size = {33, 33, 33}};
+    for (int far = -1; far <= 1; far += 2) {
+        const double bulk = 1e9 * far;
+        const isogi_transfer_point p[] = {{bulk + 0.4, {1, 1, 1}, 0}, {bulk + 0.6, {1, 1, 1}, 0.5f}, {bulk + 1.5, {1, 1, 1}, 0.5f},
+                                          {bulk + 2, {1, 1, 1}, 0}};
+        const isogi_transfer transfer = {p, 4, NULL, 0};
+        isogi_pyramid *pyramid = NULL;
+        float v[4][125 * COUNT], at[125][3];
+        for (int i = 0; i < 33 * 33 * 33; i++) {
+            const double x = i % 33 - 16, y = i / 33 % 33 - 16, z = i / (33 * 33) - 16, r = sqrt(x * x + y * y + z * z);
+            data[i] = bulk + (r < 8 ? 1 : r < 10 ? (10 - r) / 2 : 0);
+        }
+        data[0] = -5 * far;
+        for (int i = 0; i < 125; i++) at[i][0] = (float)(8 * (i % 5)), at[i][1] = (float)(8 * (i / 5 % 5)), at[i][2] = (float)(8 * (i / 25));
+        CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+        for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,
+                .grid = {5, 5, 5}};
+            double sum = 0;
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, 125, v[method]);
+            for (int i = 0; i < 125; i++) sum += fabs((double)v[method][COUNT * i] - (double)v[ISOGI_DVR_BRUTE][COUNT * i]) / 125;
+            CHECK(sum < 0.2, "%g, method %d: %g off on average", bulk, method, sum);
+            isogi_dvr_free(dvr);
+        }
+        isogi_vol_free(pyramid);
+    }
+}
+
 /* However small the unit of extinction: what has none is transparent. Counts that no array can have are refused. */
 TEST(tiny_units_and_endless_counts) {
     field f = field_new(8, 8, 8);

@@ -1114,6 +1114,27 @@ TEST(albedo_by_isovalue) {
     CHECK(fabsf(rgb[0] - 0.35f) < 1e-6f, "of any value: %g", (double)rgb[0]);
     points[0].value = 10, points[1].value = 20;
 #endif
+    { /* many points, some of one value: as one after another */
+        static isogi_albedo_point many[999];
+        isogi_trace_desc long_table;
+        test_random r = {12};
+        int worse = 0;
+        memset(&long_table, 0, sizeof long_table);
+        long_table.albedo_points = many, long_table.albedo_count = 999;
+        for (int i = 0; i < 999; i++) many[i].value = i / 3 * 0.5, many[i].rgb[0] = (float)random_unit(&r);
+        for (int k = 0; k < 2000; k++) {
+            const double x = k & 1 ? random_range(&r, -2, 170) : 0.25 * (k / 2 % 700);
+            float expected;
+            int i = 0;
+            while (i < 999 && many[i].value < x) i++;
+            expected = i == 0 || i == 999 ? many[i ? 998 : 0].rgb[0]
+                                          : (float)((double)many[i - 1].rgb[0] + (x - many[i - 1].value) / (many[i].value - many[i - 1].value) *
+                                                    ((double)many[i].rgb[0] - (double)many[i - 1].rgb[0]));
+            isogi_trace_albedo(&long_table, x, rgb);
+            worse += fabsf(rgb[0] - expected) > 1e-6f;
+        }
+        CHECK(!worse, "%d of 2000 differ", worse);
+    }
     d.albedo[0] = 0.5f, d.albedo[1] = d.albedo[2] = 1;
     isogi_trace_albedo(&d, 10, rgb);
     CHECK(fabsf(rgb[0] - 0.1f) < 1e-6f && fabsf(rgb[2] - 0.6f) < 1e-6f, "multiplied: %g %g", (double)rgb[0], (double)rgb[2]);

@@ -664,6 +664,41 @@ TEST(a_bright_place_ends_no_reflections_elsewhere) {
     scene_free(&s);
 }
 
+/* Two closed balls of air, a lamp in each: what is reflected in the dark one, whose walls are nearly white, is the same share of its lamp
+   beside a million times as much light in the other, black one. */
+static double two_balls(const double p[3], const double *q) {
+    return fmin(length3(p[0] - q[0], p[1] - q[2], p[2] - q[2]), length3(p[0] - q[1], p[1] - q[2], p[2] - q[2])) - q[3];
+}
+static void black_and_white(void *user, double isovalue, const double p[3], float albedo[3], float emission[3]) {
+    (void)user, (void)isovalue, (void)emission;
+    for (int a = 0; a < 3; a++) albedo[a] = p[0] < 20 ? 0.1f : 0.95f;
+}
+TEST(reflections_of_a_dim_lamp_are_those_of_a_bright_one) {
+    enum { POINTS = 40 };
+    double q[4] = {10, 31, 9.5, 7}, mean[3] = {0, 0, 0};
+    scene s = scene_make(42, 20, 20, NULL, two_balls, q);
+    static float points[POINTS][3], e[POINTS][3];
+    test_random r = {3};
+    for (int i = 0; i < POINTS; i++) {
+        double n[3];
+        random_direction(&r, n);
+        for (int a = 0; a < 3; a++) points[i][a] = (float)(q[a ? 2 : 1] + q[3] * n[a]);
+    }
+    for (int k = 0; k < 3; k++) {
+        const double power = (const double[]){1, 1e5, 1e6}[k];
+        const isogi_light lights[2] = {light_make(ISOGI_LIGHT_POINT, 32, 9.5f, 9.5f, 100, 0),
+                                       light_make(ISOGI_LIGHT_POINT, 10, 9.5f, 9.5f, k ? 100 * power : 0, 0)};
+        isogi_trace_desc d = desc_make(&s, 0.5f, -1, 8);
+        memset(&d.lighting, 0, sizeof d.lighting), d.lighting.lights = lights, d.lighting.light_count = 2;
+        d.method = ISOGI_TRACE_FEEDBACK, d.isovalue_min = -0.01, d.isovalue_max = 0.01, d.material = black_and_white;
+        bake_and_sample(&d, NULL, (const float(*)[3])points, POINTS, e);
+        for (int i = 0; i < POINTS; i++) mean[k] += (double)e[i][0] / POINTS;
+    }
+    CHECK(fabs(mean[1] / mean[0] - 1) < 1e-3 && fabs(mean[2] / mean[0] - 1) < 1e-3, "E %.5f, beside much light %.5f, %.5f", mean[0],
+          mean[1], mean[2]);
+    scene_free(&s);
+}
+
 /* A closed white room that glows: n reflections bring n + 1 times what is sent, however many these are, and are no endless light. */
 SLOW_TEST(thousands_of_reflections_are_no_endless_light) {
     double q[5] = {8, 8, 8, 5.2, 30};

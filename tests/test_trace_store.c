@@ -666,6 +666,34 @@ TEST(lookups_cross_the_border_of_merged_boxes) {
     free(block), free(all), scene_free(&s);
 }
 
+/* A lazy box, points near its end whose texels within have no surface: the nearest one is asked for, whatever else was. */
+TEST(points_at_the_end_of_a_lazy_box_do_not_depend_on_others) {
+    double q[1] = {0.6};
+    static float points[2000][3], e[2][3], error[2];
+    int near = 0, differ = 0, unknown = 0;
+    scene s = scene_make(12, 12, 12, NULL, crumbs, q);
+    int n = surface_points(&s, 0, 2000, 5, points);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 0, 4);
+    isogi_trace *all = NULL;
+    d.method = ISOGI_TRACE_PATHS, d.lazy = 1;
+    for (int a = 0; a < 3; a++) d.lattice[a] = 20, d.box_end[a] = a ? 20 : 10;
+    for (int i = 0; i < n; i++) /* between the last texels of the box and those beyond */
+        if (fabs((double)points[i][0] - 9.5 * 11 / 19) < 0.3) memcpy(points[near++], points[i], sizeof points[i]);
+    CHECK(isogi_trace_create(&all, &d, NULL) == ISOGI_OK && isogi_trace_request(all, (const float(*)[3])points, (size_t)near) == ISOGI_OK &&
+              isogi_trace_step(all, 0, NULL) == ISOGI_OK, "%d points", near);
+    for (int i = 0; i < near; i++) {
+        isogi_trace *alone = NULL;
+        const float(*p)[3] = (const float(*)[3])points + i;
+        CHECK(isogi_trace_create(&alone, &d, NULL) == ISOGI_OK && isogi_trace_request(alone, p, 1) == ISOGI_OK &&
+                  isogi_trace_step(alone, 0, NULL) == ISOGI_OK, "point %d", i);
+        isogi_trace_sample(alone, p, 1, &e[0], &error[0]), isogi_trace_sample(all, p, 1, &e[1], &error[1]);
+        differ += memcmp(e[0], e[1], sizeof e[0]) != 0, unknown += !isfinite(error[0]) && isfinite(error[1]);
+        isogi_trace_free(alone);
+    }
+    CHECK(near > 60 && !differ && !unknown, "of %d points %d differ, %d are unknown", near, differ, unknown);
+    isogi_trace_free(all), scene_free(&s);
+}
+
 /* Any change of any byte, any cut: refused, and nothing changes. With the hash mended, what is left to find is found. */
 TEST(damaged_blocks_are_refused) {
     double q[2] = {0.5, 4};
