@@ -2266,6 +2266,7 @@ typedef struct isogi_trace__brick {
     uint64_t held;
     uint8_t *records; /* NULL until one of them is computed */
     uint32_t *node;   /* number + 1 of what gathers each texel's light, 0 = none; NULL = none at all */
+    uint32_t newest;  /* the largest of these numbers */
 } isogi_trace__brick;
 
 typedef struct isogi_trace__ref {
@@ -2617,7 +2618,7 @@ static isogi_trace__brick *isogi_trace__brick_new(const isogi_trace *t) {
 /* Gives back the numbers of its nodes. */
 static void isogi_trace__brick_forget(const isogi_trace *t, isogi_trace__brick *brick) {
     isogi_release(&t->context, brick->node, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
-    brick->node = NULL;
+    brick->node = NULL, brick->newest = 0;
 }
 
 static void isogi_trace__brick_free(const isogi_trace *t, isogi_trace__brick *brick) {
@@ -3951,7 +3952,9 @@ struct isogi_trace__feedback {
     int making;      /* nodes: 1 of every other texel along each axis, 2 of the others; 0 when they are made */
     size_t made, made_bricks; /* of the queue: bricks that are done, and to do */
     size_t placed;   /* texels before this one know where they lie; */
-    size_t settled;  /* those before this one were finished when the texture last had nothing to do */
+    size_t settled;  /* those before this one were finished when the texture last had nothing to do; */
+    size_t settled_probes, settled_segments[2]; /* probes, and segments of texels and of probes, that there were then */
+    int stirred; /* the light of some of these probes may be another one now */
     size_t open;     /* texels that want more samples than they have at the end of a level */
     int bounced;     /* sums over texels' hits are of a level before */
     uint64_t partial; /* samples of texels that are not finished, */
@@ -5158,6 +5161,7 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
     taken.strands = tasks < 16 ? 1 : ISOGI_TRACE__STRANDS, tasks += taken.strands;
     if (taken.strands > 1) isogi_parallel(&silent, tasks, isogi_trace__take_task, &taken, 0, 1);
     else for (i = 0; i < tasks; i++) isogi_trace__take_task(&taken, i); /* not worth a thread */
+    if (f->on_probes && f->plans[0].node < f->settled_probes) f->stirred = 1; /* the first of the batch */
     f->probes.count += taken.made, f->probe_checked = f->probe_again = 0, f->batches++;
     isogi_trace__segment_add(set, &segment);
     for (i = 0; i < isogi_trace__cast_tasks(f); i++) isogi_trace__add(&t->counters, &t->task_counters[i]);
@@ -5166,6 +5170,14 @@ static isogi_result isogi_trace__spans_run(isogi_trace *t, double from, double t
 }
 
 /* ---- passes over probes ---- */
+
+/* A request brings texels to those that there were. What is finished does not read the new ones' probes, which are made where there were
+   none: it rests, unless probes that it reads are gathered anew, or more. How many texels do, and probes. */
+static size_t isogi_trace__resting(const isogi_trace__feedback *f) { return f->stirred ? 0 : f->settled; }
+static size_t isogi_trace__resting_probes(const isogi_trace__feedback *f) { return f->stirred ? 0 : f->settled_probes; }
+static size_t isogi_trace__resting_segments(const isogi_trace__feedback *f, int probes) {
+    return f->stirred ? 0 : f->settled_segments[probes];
+}
 
 /* Where a task's nodes begin and end. */
 static size_t isogi_trace__sweep(const isogi_trace *t, size_t task, size_t count, size_t *begin) {
@@ -5178,12 +5190,18 @@ static int isogi_trace__channel(const isogi_trace *t, int value) {
 }
 
 /* What passes read of probes, in few bytes. The first pass begins with what comes from sky and lights; a probe that reads no other has
-   settled. */
+   settled, as one that rests has. */
 static void isogi_trace__direct_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->probes;
+    const size_t resting = isogi_trace__resting_probes(t->feedback);
     size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
     int a;
+    for (; i < end && i < resting; i++) {
+        memcpy(isogi_trace__values_at(set, i, ISOGI_TRACE__OUT_VALUES + 1 - set->out, v), isogi_trace__light_at(set, i, v),
+               v * sizeof(float));
+        *isogi_trace__settled_at(set, i, 0) = *isogi_trace__settled_at(set, i, 1) = 1;
+    }
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         isogi_trace__reflector *r = isogi_trace__reflector_at(set, i);
@@ -5283,7 +5301,7 @@ static int isogi_trace__pass_end(isogi_trace *t) {
     isogi_trace__set *set = &f->probes;
     double change = 0, largest = 0, share = 0;
     size_t i;
-    for (i = 0; i < set->segment_count; i++) {
+    for (i = isogi_trace__resting_segments(f, 1); i < set->segment_count; i++) {
         if (set->segments[i].share > share) share = set->segments[i].share;
         if (set->segments[i].change > change) change = set->segments[i].change;
         if (set->segments[i].largest > largest) largest = set->segments[i].largest;
@@ -5504,8 +5522,8 @@ static int isogi_trace__solve_end(isogi_trace *t) {
 static void isogi_trace__clear_task(void *arg, size_t task) {
     const isogi_trace *t = (const isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
-    size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i);
-    for (; i < end; i++) {
+    size_t v = (size_t)t->values, i, end = isogi_trace__sweep(t, task, set->count, &i), resting = isogi_trace__resting(t->feedback);
+    for (i = i > resting ? i : resting; i < end; i++) {
         memset(isogi_trace__values_at(set, i, ISOGI_TRACE__BOUNCE_VALUES, v), 0, v * sizeof(float));
         isogi_trace__node_at(set, i)->bounce_square = 0;
     }
@@ -5615,9 +5633,9 @@ static double isogi_trace__shared_spread(const isogi_trace *t, const isogi_trace
 static void isogi_trace__guide_task(void *arg, size_t task) {
     isogi_trace *t = (isogi_trace *)arg;
     isogi_trace__set *set = &t->feedback->texels;
-    size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values;
+    size_t i, end = isogi_trace__sweep(t, task, set->count, &i), v = (size_t)t->values, resting = isogi_trace__resting(t->feedback);
     const double rays = isogi_trace__sky_rays(&t->scene.sky, 1), square = t->scene.square;
-    for (; i < end; i++) {
+    for (i = i > resting ? i : resting; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         isogi_trace__guide *g = isogi_trace__guide_at(set, i);
         const float *direct = isogi_trace__values_at(set, i, ISOGI_TRACE__DIRECT_VALUES, v),
@@ -6128,22 +6146,36 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
     }
 }
 
+/* Whether a brick's light stays as it is: no texel that does not rest is in one of the bricks around, which the filter reads, or, where it
+   goes in two rounds, in one of those around them. */
+static int isogi_trace__brick_rests(const isogi_trace *t, const isogi_trace__node *any) {
+    const size_t resting = isogi_trace__resting(t->feedback);
+    const size_t reach = t->feedback->phase == ISOGI_TRACE__PUBLISH && isogi_trace__piloted(t) ? 2 : 1;
+    size_t low[3], high[3], x, y, z;
+    int a;
+    for (a = 0; a < 3 && resting; a++) {
+        const size_t brick = any->texel[a] / ISOGI_TRACE__SIDE;
+        low[a] = brick > reach ? brick - reach : 0, high[a] = brick + reach < t->size[a] ? brick + reach : t->size[a] - 1;
+    }
+    if (!resting || any->brick->newest > resting) return 0;
+    for (z = low[2]; z <= high[2]; z++)
+        for (y = low[1]; y <= high[1]; y++)
+            for (x = low[0]; x <= high[0]; x++) {
+                const isogi_trace__brick *other = t->bricks[x + t->size[0] * (y + t->size[1] * z)];
+                if (other && other->newest > resting) return 0;
+            }
+    return 1;
+}
+
 /* Nodes of a sweep. Where the filter is at work, bricks at a time: each with the sweep that has the last of its nodes. */
 static void isogi_trace__publish_sweep(isogi_trace *t, size_t sweep, isogi_trace__dense *block) {
     isogi_trace__set *set = &t->feedback->texels;
     size_t i, end = isogi_trace__sweep(t, sweep, set->count, &i);
-    uint32_t slot;
     for (; i < end; i++) {
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
-        uint32_t last = 0;
         if (!block) {
-            if (isogi_trace__unpublished(t, i)) isogi_trace__publish(t, i, NULL);
-            continue;
-        }
-        if (i + 1 < set->count && isogi_trace__node_at(set, i + 1)->brick == n->brick) continue;
-        for (slot = 0; slot < ISOGI_TRACE__TEXELS; slot++)
-            if (n->brick->node[slot] > last) last = n->brick->node[slot];
-        if (last == i + 1) isogi_trace__publish_brick(t, i, block);
+            if (i >= isogi_trace__resting(t->feedback) && isogi_trace__unpublished(t, i)) isogi_trace__publish(t, i, NULL);
+        } else if (n->brick->newest == i + 1 && !isogi_trace__brick_rests(t, n)) isogi_trace__publish_brick(t, i, block);
     }
 }
 
@@ -6227,7 +6259,8 @@ static void isogi_trace__group_free(isogi_trace *t) {
     isogi_trace__solver_free(t);
     isogi_trace__set_free(t, &f->texels);
     isogi_trace__set_free(t, &f->probes);
-    f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->settled = f->carried = f->span_count = 0;
+    f->cursor = f->probe_cursor = f->probe_end = f->probe_counted = f->placed = f->carried = f->span_count = 0;
+    f->settled = f->settled_probes = f->settled_segments[0] = f->settled_segments[1] = 0, f->stirred = 0;
     f->phase = ISOGI_TRACE__AT_REST, f->unpublished = f->making = f->level = f->bounced = f->renewed = 0, f->partial = f->unfinished = 0;
     f->probe_checked = f->probe_again = 0;
     f->probe_part = f->most = 0;
@@ -6252,7 +6285,7 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
 }
 
 /* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered (of transfer for
-   8 of their values, too) or given back. */
+   8 of their values, too) or given back, for 64 that rest. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace *t, size_t task) {
     const isogi_trace__feedback *f = t->feedback;
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
@@ -6260,6 +6293,8 @@ static uint64_t isogi_trace__phase_cost(const isogi_trace *t, size_t task) {
     if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE)
         return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
+    if (f->phase != ISOGI_TRACE__DIRECT && f->phase != ISOGI_TRACE__FORGET && (task + 1) * ISOGI_TRACE__SWEEP <= isogi_trace__resting(f))
+        return ISOGI_TRACE__SWEEP / 64;
     if (isogi_trace__publishing(f) && t->scene.desc.mode == ISOGI_TRACE_TRANSFER && !t->scene.desc.unfiltered)
         return ISOGI_TRACE__SWEEP / 2 + ISOGI_TRACE__SWEEP / 8 * (uint64_t)t->values;
     return isogi_trace__publishing(f) || f->phase == ISOGI_TRACE__FORGET ? ISOGI_TRACE__SWEEP / 2 : ISOGI_TRACE__SWEEP / 8;
@@ -6291,15 +6326,19 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     case ISOGI_TRACE__DIRECT:
         f->phase = t->scene.desc.bounces && t->scene.desc.bounces != 1 ? ISOGI_TRACE__PASS : ISOGI_TRACE__CLEAR;
         f->pass = 1, f->before = f->middle = 0, f->dark = 1e-37, f->diverges = 0;
+        f->carried = f->phase == ISOGI_TRACE__PASS ? isogi_trace__resting_segments(f, 1) : 0;
         break;
     case ISOGI_TRACE__PASS:
         if (isogi_trace__pass_end(t)) f->phase = ISOGI_TRACE__CLEAR;
         else if (f->pass == ISOGI_TRACE__PASSES && t->scene.desc.bounces < 0 && isogi_trace__solver_new(t)) f->phase = ISOGI_TRACE__SOLVE;
+        else f->carried = isogi_trace__resting_segments(f, 1);
         break;
     case ISOGI_TRACE__SOLVE:
         if (isogi_trace__solve_end(t)) f->phase = ISOGI_TRACE__CLEAR, isogi_trace__solver_free(t);
         break;
-    case ISOGI_TRACE__CLEAR: f->phase = ISOGI_TRACE__BOUNCE, f->segment = 0, f->bounced = 1; break;
+    case ISOGI_TRACE__CLEAR:
+        f->phase = ISOGI_TRACE__BOUNCE, f->segment = isogi_trace__resting_segments(f, 0), f->bounced = 1;
+        break;
     case ISOGI_TRACE__BOUNCE:
         if (++f->segment >= f->texels.segment_count) f->phase = ISOGI_TRACE__GUIDE;
         break;
@@ -6441,7 +6480,7 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         slot = isogi_trace__lowest_bit(left);
         memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
         set->chunks[set->count / ISOGI_TRACE__CHUNK].where[set->count % ISOGI_TRACE__CHUNK] = ISOGI_TRACE__TEXELS * index + slot;
-        brick->node[slot] = (uint32_t)++set->count, t->feedback->unfinished++;
+        brick->node[slot] = brick->newest = (uint32_t)++set->count, t->feedback->unfinished++;
         if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
     }
     return ISOGI_OK;
@@ -6495,7 +6534,11 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint
 
 /* To be called before there is something to do: all nodes that there are have been finished. */
 static void isogi_trace__settle(const isogi_trace *t) {
-    if (t->feedback && !t->wanted) t->feedback->settled = t->feedback->texels.count;
+    isogi_trace__feedback *f = t->feedback;
+    if (!f || t->wanted) return;
+    f->settled = f->texels.count, f->settled_probes = f->probes.count;
+    f->settled_segments[0] = f->texels.segment_count, f->settled_segments[1] = f->probes.segment_count;
+    f->stirred = f->diverges || t->scene.desc.bounces > 1; /* they have no more reflections than those have to come */
 }
 
 /* All nodes are forgotten, also where the memory for a group's ran out half way. */

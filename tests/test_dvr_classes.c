@@ -612,7 +612,7 @@ TEST(a_voxel_beyond_zero_takes_no_digits_from_the_others) {
             data[i] = bulk + (r < 8 ? 1 : r < 10 ? (10 - r) / 2 : 0);
         }
         data[0] = -5 * far;
-        for (int i = 0; i < 125; i++) at[i][0] = (float)(8 * (i % 5)), at[i][1] = (float)(8 * (i / 5 % 5)), at[i][2] = (float)(8 * (i / 25));
+        for (int i = 0; i < 375; i++) at[i / 3][i % 3] = (float)(8 * (i % 3 == 0 ? i / 3 % 5 : i % 3 == 1 ? i / 15 % 5 : i / 75));
         CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
         for (int method = ISOGI_DVR_BRUTE; method <= ISOGI_DVR_SWEEP; method++) {
             const isogi_dvr_desc desc = {.pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method,

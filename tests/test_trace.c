@@ -1127,9 +1127,10 @@ TEST(albedo_by_isovalue) {
             float expected;
             int i = 0;
             while (i < 999 && many[i].value < x) i++;
-            expected = i == 0 || i == 999 ? many[i ? 998 : 0].rgb[0]
-                                          : (float)((double)many[i - 1].rgb[0] + (x - many[i - 1].value) / (many[i].value - many[i - 1].value) *
-                                                    ((double)many[i].rgb[0] - (double)many[i - 1].rgb[0]));
+            expected = many[i < 999 ? i : 998].rgb[0];
+            if (i > 0 && i < 999)
+                expected = (float)(((many[i].value - x) * (double)many[i - 1].rgb[0] + (x - many[i - 1].value) * (double)expected) /
+                                   (many[i].value - many[i - 1].value));
             isogi_trace_albedo(&long_table, x, rgb);
             worse += fabsf(rgb[0] - expected) > 1e-6f;
         }

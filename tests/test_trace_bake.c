@@ -2048,6 +2048,51 @@ TEST(drafts_of_any_colour_have_errors) {
     scene_free(&s);
 }
 
+/* A walk through a lazy texture: each request costs what it brings, however much was asked for before; light is that of one request for
+   all, to the bit where none is reflected. */
+static int by_x(const void *a, const void *b) {
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+TEST(requests_cost_what_they_bring) {
+    enum { POINTS = 1000, PARTS = 8 };
+    scene s = scene_make(30, 20, 20, NULL, ripples, NULL);
+    static float points[POINTS][3], e[2][POINTS][3];
+    const int n = surface_points(&s, 0, POINTS, 3, points);
+    qsort(points, POINTS, sizeof points[0], by_x);
+    for (int bounces = 1; bounces >= -1; bounces--)
+        for (int unfiltered = 0; unfiltered < 2; unfiltered++) {
+            const int samples = bounces ? 4 : 36;
+            isogi_trace_desc d = feedback(&s, 0.7f, bounces, samples);
+            int steps[2] = {0, 0}, most = 0;
+            double apart = 0, sum = 0;
+            d.lazy = 1, d.unfiltered = unfiltered;
+            for (int k = 0; k < 2; k++) {
+                isogi_trace *t = NULL;
+                CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create %d", k);
+                for (int part = 0; part < (k ? PARTS : 1); part++) {
+                    const int first = k ? n * part / PARTS : 0, end = k ? n * (part + 1) / PARTS : n;
+                    double left = 1;
+                    int some = 0;
+                    isogi_trace_request(t, (const float(*)[3])points + first, (size_t)(end - first));
+                    while (left > 0 && isogi_trace_step(t, 200, &left) == ISOGI_OK) some++;
+                    steps[k] += some, most = k && some > most ? some : most;
+                }
+                isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[k], NULL);
+                isogi_trace_free(t);
+            }
+            for (int i = 0; i < n; i++)
+                apart += pow((double)e[1][i][1] - (double)e[0][i][1], 2), sum += pow((double)e[0][i][1], 2);
+            apart = sqrt(apart / sum);
+            printf("    %d samples, %d reflections: %d steps, in %d parts %d, up to %d each; %.3g apart\n", samples, bounces, steps[0],
+                   PARTS, steps[1], most, apart);
+            CHECK(n == POINTS && steps[1] < 1.3 * steps[0] && most < 2.5 / PARTS * steps[0], "%d, %d: %d steps, %d in all parts, up to %d",
+                  bounces, unfiltered, steps[0], steps[1], most);
+            CHECK(apart <= (bounces ? 0.15 : 0), "%d, %d: %g apart", bounces, unfiltered, apart);
+        }
+    scene_free(&s);
+}
+
 /* More points than are looked through together, by many tasks, most of them in cells of others before them: the texels of each alone. */
 TEST(many_points_in_one_request) {
     enum { POINTS = 70000, PIECE = 1000 };
