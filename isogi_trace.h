@@ -180,12 +180,15 @@
                 its error says so, and isogi_trace_report.diverges. Under matter (HIGH_SIDE) of albedo above .9 narrow places may err by
                 several times the error that is told; so may, with desc.reach, what is reflected in capped matter a voxel thick.
                 Voxels of 1e-150 to 1e150 world units: squares of lengths must neither vanish nor overflow. Where matter is
-                thinner than the lattice's spacing a lookup mixes the light of both of its sides.
+                thinner than the lattice's spacing a lookup mixes the light of both of its sides. A chunk of a larger field
+                (isogi_volume.first) is lit as if it were all there is: its halo counts for smooth normals alone.
    Cost         PATHS: samples * (1 + lights that have a size) rays for a texel, and as many for each reflection; an uneven image counts as
                 a light. FEEDBACK: samples * (1 + half of these lights), each of the first four with all lights; where any light looks
                 wider than 8 degrees from the middle of the volume, four rays to every light with each of the first two samples, then two;
                 and for an image 2 to 4, half of which are below the horizon; for each probe as if by as many samples as hits read it, 1 (2
-                where the albedo is above .9) to 8, in pockets 64, with one ray to the image for each.
+                where the albedo is above .9) to 8, in pockets 64, with one ray to the image for each. A request, when lazy, costs what
+                it brings; what was finished before is only worked out anew where its probes are gathered anew, as in pockets, and with
+                2 reflections and more that are not all of them.
 
    History  1.0  first release
 */
@@ -2263,10 +2266,10 @@ enum {
 typedef struct isogi_trace__brick {
     uint8_t state[ISOGI_TRACE__TEXELS];
     int queued;
+    uint32_t newest;  /* the largest number in `node` */
     uint64_t held;
     uint8_t *records; /* NULL until one of them is computed */
     uint32_t *node;   /* number + 1 of what gathers each texel's light, 0 = none; NULL = none at all */
-    uint32_t newest;  /* the largest of these numbers */
 } isogi_trace__brick;
 
 typedef struct isogi_trace__ref {
