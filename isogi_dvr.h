@@ -217,14 +217,15 @@
    Values that are not finite: a cell with such a corner is transparent. An axis of one voxel makes a box without volume, which is
    transparent (rays within its plane do sample it; peaks there only with desc.bound, and in data space unless post-classified). For sweeps
    and the paper's method such a voxel alone does not exist: those around it keep their shadows. Up to ISOGI_DVR_MAX_PEAKS peaks (in data
-   space, exact or pre-integrated, any number), 2^16 directions, and 2^24 samples on the longest ray. Pre-integrated pictures of physical
-   space tell up to 16384 classes of values apart, of those that occur and on which the transfer function depends: a piece of it that is
-   narrower than four of them keeps its opacity, blurred over a class; regions of exactly a step's value, such as labels, have what begins
-   there, if no point is that close. They do where the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th
-   of their distance from zero, and where no voxel is beyond floats; else pictures are post-classified, in double, which takes longer:
-   subtract what values have in common, or let `scale` and `bias` make them of others. With spans beyond that, or voxels beyond floats,
-   visibility is by brute force, too. Errors: ISOGI_INVALID for anything outside of its documented range (isogi_dvr_fault, isogi_view_fault,
-   isogi_transfer_fault say which), ISOGI_TOO_LARGE where sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   space, exact or pre-integrated, any number), 2^16 directions, 2^24 samples on the longest ray, and eyes up to 1e17 voxels away.
+   Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur and on which the transfer
+   function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class; regions of exactly a step's
+   value, such as labels, have what begins there, if no point is that close. They do where the span of these values is 1e-26 to 1e30 and, of
+   floats and doubles, at least a 4096th of their distance from zero, and where no voxel is beyond floats; else pictures are
+   post-classified, in double, which takes longer: subtract what values have in common, or let `scale` and `bias` make them of others. With
+   spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors: ISOGI_INVALID for anything outside of its
+   documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which), ISOGI_TOO_LARGE where sizes overflow or pass these
+   limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
