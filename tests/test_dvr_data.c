@@ -823,6 +823,104 @@ TEST(a_second_field_colours_peaks) {
     field_free(&f), field_free(&second);
 }
 
+/* Beyond its box the second field is what it is at its border, on both sides. */
+TEST(beyond_its_box_the_second_field_is_as_at_its_border) {
+    tilt[0] = 1, tilt[1] = tilt[2] = 0;
+    field f = field_of(tilted, 17), second = field_new(6, 6, 6);
+    for (size_t i = 0; i < field_count(&second); i++) second.value[i] = (double)(i / 6 % 6); /* y - 5 */
+    for (int a = 0; a < 3; a++) second.volume.origin[a] = 5;
+    field_build(&second);
+    const isogi_transfer_point colours[] = {{-20, {0, 1, 0.5f}, 0}, {20, {1, 0, 0.5f}, 0}};
+    const isogi_peak peak = {0.4, {1, 0.5f, 1}, 0.6f};
+    const isogi_transfer transfer = {NULL, 0, &peak, 1};
+    const isogi_dvr_desc desc = {
+        .pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .second = second.pyramid, .second_points = colours, .second_count = 2};
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
+    for (int i = 0; i < 16; i++) {
+        const double y = 0.4 + i, u = (fmin(fmax(y - 5, 0), 5) + 20) / 40, expected[3] = {0.6 * u, 0.6 * 0.5 * (1 - u), 0.6 * 0.5};
+        const double eye[3] = {-20, y, 15.5}, target[3] = {5, y, 15.5}; /* beyond it along z, too */
+        const pixel p = cast(dvr, eye, target, NULL);
+        for (int a = 0; a < 3; a++)
+            CHECK(fabs((double)p.c[a] - expected[a]) < 1e-6, "y %g channel %d: %g, not %g", y, a, (double)p.c[a], expected[a]);
+    }
+    isogi_dvr_free(dvr), field_free(&f), field_free(&second);
+}
+
+static double known_above_three(void *user, const double point[3], double gradient[3]) {
+    (void)user, gradient[0] = gradient[1] = gradient[2] = 0;
+    return point[1] > 3 ? 1 : (double)NAN;
+}
+
+/* Where the second field has no value, be it given by voxels or by a function, peaks have their own colour. */
+TEST(peaks_keep_their_colour_where_the_second_field_is_unknown) {
+    tilt[0] = 1, tilt[1] = tilt[2] = 0;
+    field f = field_of(tilted, 8), second = field_new(8, 8, 8);
+    const isogi_field function = {.value = known_above_three, .hessian = 1, .high = {7, 7, 7}, .cells = {8, 8, 8}};
+    isogi_pyramid *other = NULL;
+    for (size_t i = 0; i < field_count(&second); i++) second.value[i] = i / 8 % 8 > 3 ? 1 : (double)NAN;
+    field_build(&second);
+    CHECK(isogi_vol_build_field(&other, &function, &serial) == ISOGI_OK, "build");
+    const isogi_transfer_point colours[] = {{0, {0, 0.25f, 0}, 0}, {1, {0.5f, 0, 0.25f}, 0}};
+    const isogi_peak peak = {0.4, {1, 0.5f, 0.8f}, 0.6f};
+    const isogi_transfer transfer = {NULL, 0, &peak, 1};
+    for (int c = 0; c < 6; c++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .classification = (isogi_dvr_classification)(c / 2),
+                                     .second = c % 2 ? other : second.pyramid, .second_points = colours, .second_count = 2};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        for (int known = 0; known < 2; known++) {
+            const double eye[3] = {-20, known ? 5.5 : 2.25, 3.3}, target[3] = {5, eye[1], 3.3};
+            const pixel p = cast(dvr, eye, target, NULL);
+            for (int a = 0; a < 3; a++) {
+                const double expected = 0.6 * (double)peak.rgb[a] * (known ? (double)colours[1].rgb[a] : 1);
+                CHECK(fabs((double)p.c[a] - expected) < 1e-6, "case %d, known %d, channel %d: %g, not %g", c, known, a, (double)p.c[a],
+                      expected);
+            }
+        }
+        isogi_dvr_free(dvr);
+    }
+    isogi_vol_free(other), field_free(&f), field_free(&second);
+}
+
+/* Rays of visibility that only touch a peak, in the plane of voxels where values turn, meet it once: half of the light is lost where
+   half of it would be by one crossing. */
+TEST(visibility_meets_a_peak_that_is_touched_once) {
+    field f = field_new(9, 7, 7);
+    float v[3][1][3];
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = 4 - fabs((double)(i % 9) - 4);
+    field_build(&f);
+    for (int k = 0; k < 3; k++) {
+        const isogi_peak peak = {4, {1, 1, 1}, 0.5f * (float)k};
+        const isogi_transfer transfer = {NULL, 0, &peak, 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = ISOGI_DVR_DATA, .shading = ISOGI_DVR_VISIBILITY, .order = 1,
+                                     .directions = 64, .grid = {2, 2, 2}};
+        const float at[1][3] = {{0, 6, 0}};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_visibility(dvr, at, 1, v[k][0]) == ISOGI_OK, "step");
+        isogi_dvr_free(dvr);
+    }
+    CHECK(v[2][0][0] < v[0][0][0] - 0.1f && fabsf(v[1][0][0] - 0.5f * (v[0][0][0] + v[2][0][0])) < 1e-4f,
+          "visibility %g without the peak, %g through half of it, %g with it", (double)v[0][0][0], (double)v[1][0][0], (double)v[2][0][0]);
+    field_free(&f);
+}
+
+/* In the middle of a sheet one voxel thick there is no normal: a peak there is seen straight on, whatever the silhouettes. */
+TEST(a_peak_without_a_normal_is_seen_straight_on) {
+    const isogi_peak peak = {1, {1, 1, 1}, 0.3f};
+    const isogi_transfer transfer = {NULL, 0, &peak, 1};
+    field f = field_new(9, 9, 9);
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = i % 9 == 4;
+    field_build(&f);
+    for (int n = 0; n < 8; n++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(n / 4), .silhouette = (isogi_dvr_silhouette)(n % 4)};
+        const double eye[3] = {-20, 3.2, 3.7}, target[3] = {8, 4.4, 4.1};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        const pixel p = cast(dvr, eye, target, NULL);
+        CHECK(fabs((double)p.c[3] - 0.3) < 1e-6, "space %d, silhouettes %d: opacity %g", n / 4, n % 4, (double)p.c[3]);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 /* ---- robustness ---- */
 
 /* Cells with a corner that is not finite are transparent, and the ray begins anew behind them: what it missed is no crossing. */

@@ -87,6 +87,64 @@ TEST(an_edit_is_seen_as_far_as_anything_depends_on_it) {
     }
 }
 
+/* What a renderer holds after an edit, and a new one with the same function and planes, of which there is at most one. */
+static void edit_is_like_new(const char *what, isogi_dvr *dvr, const isogi_dvr_desc *desc, const isogi_transfer *transfer,
+                             const double (*plane)[4]) {
+    enum { PLACES = 300 };
+    static float at[PLACES][3];
+    test_random r = {17};
+    double most[3];
+    isogi_dvr *fresh = dvr_new(desc, transfer);
+    CHECK(isogi_dvr_set_transfer(dvr, transfer) == ISOGI_OK && isogi_dvr_set_clip(fresh, plane, plane != NULL) == ISOGI_OK, "edit");
+    if (plane) CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK, "clip");
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_step(fresh, 0, NULL) == ISOGI_OK, "step");
+    for (int i = 0; i < PLACES; i++)
+        for (int a = 0; a < 3; a++)
+            at[i][a] = (float)random_range(&r, 0, (double)(isogi_vol_volume(desc->pyramid)->size[a] - 1));
+    differences(dvr, fresh, (const float(*)[3])at, PLACES, 0, most);
+    CHECK(!(most[0] > 0), "%s: visibility off by %g", what, most[0]);
+    isogi_dvr_free(fresh);
+}
+
+/* Edits that leave most of a block as it was, by the lattice of sweeps: a plane that moves on within the blocks that it cuts; extinction
+   that changes just below a value alone, where a step is; and values of one block alone that a node beyond its border reaches. */
+TEST(small_edits_reach_all_that_they_change) {
+    field f = field_new(41, 17, 17), ramp = field_new(41, 17, 17);
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = 1, ramp.value[i] = (double)(i % 41);
+    field_build(&f), field_build(&ramp);
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 2, .directions = 16, .grid = {5, 3, 3}};
+    isogi_dvr_desc wide = desc;
+    wide.pyramid = ramp.pyramid;
+    const isogi_transfer_point even = {0, {1, 1, 1}, 0.05f};
+    const isogi_transfer medium = {&even, 1, NULL, 0};
+    isogi_dvr *dvr = dvr_new(&desc, &medium);
+    for (int i = 0; i < 4; i++) { /* all within the first blocks along x, forth and back */
+        const double plane[1][4] = {{1, 0, 0, -(const double[]){3.3, 9.1, 13.7, 5.2}[i]}};
+        edit_is_like_new("a plane moves", dvr, &desc, &medium, plane);
+    }
+    isogi_dvr_free(dvr);
+    isogi_transfer_point step[] = {{0, {1, 1, 1}, 0}, {20, {1, 1, 1}, 0}, {20, {1, 1, 1}, 0.1f}, {40, {1, 1, 1}, 0.1f}};
+    const isogi_transfer steps = {step, 4, NULL, 0};
+    dvr = dvr_new(&wide, &steps);
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+    for (int i = 0; i < 3; i++) {
+        step[1].extinction = i % 2 ? 0 : 0.2f;
+        edit_is_like_new("a value just below a step", dvr, &wide, &steps, NULL);
+    }
+    isogi_dvr_free(dvr);
+    isogi_transfer_point tent[] = {{15.1, {1, 1, 1}, 0}, {15.5, {1, 1, 1}, 0.001f}, {15.9, {1, 1, 1}, 0},
+                                   {30, {1, 1, 1}, 0},   {35, {1, 1, 1}, 0.01f},  {40, {1, 1, 1}, 0}};
+    const isogi_transfer tents = {tent, 6, NULL, 0};
+    wide.visibility_step = 10; /* a node at 20 is the mean of 15 to 25; blocks part at 16 */
+    dvr = dvr_new(&wide, &tents);
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+    for (int i = 0; i < 3; i++) {
+        tent[1].extinction = i % 2 ? 0.001f : 2;
+        edit_is_like_new("values beside a border of blocks", dvr, &wide, &tents, NULL);
+    }
+    isogi_dvr_free(dvr), field_free(&f), field_free(&ramp);
+}
+
 /* Edits of one point, clip planes and steps that are broken off, in any order: what is seen at the end is what a new renderer sees, though
    it computes only what changed. Eight layers of blocks along x, of which an edit touches two or three; levels of others change as the
    budget goes elsewhere, and local rays of up to two blocks reach across. */

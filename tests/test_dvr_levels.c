@@ -334,6 +334,32 @@ TEST(peaks_take_the_regular_grid_and_sweeps_the_blocks_again) {
     field_free(&f);
 }
 
+/* The same where blocks of many resolutions lie side by side: points of the regular grid are other ones, and more. */
+TEST(peaks_take_the_regular_grid_from_blocks_of_all_kinds) {
+    enum { PLACES = 60 };
+    field f = field_of(ball, 33);
+    const isogi_peak peak = {0.3, {1, 1, 1}, 0.5f};
+    const isogi_transfer peaked = {solid, 5, &peak, 1};
+    isogi_dvr_desc desc = several(&f, 33, 8);
+    float at[PLACES][3], v[2][PLACES][1];
+    test_random r = {23};
+    isogi_dvr_report report;
+    desc.directions = 6, desc.order = 1;
+    for (int i = 0; i < 3 * PLACES; i++) at[i / 3][i % 3] = (float)random_range(&r, 0, 32);
+    for (int k = 0; k < 2; k++) {
+        if (k) desc.coarsest = 1, desc.method = ISOGI_DVR_BRUTE;
+        isogi_dvr *dvr = stepped(&desc, k ? &peaked : &scenery, &serial);
+        if (!k) CHECK(isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.grid_points < 20000, "%zu points", report.grid_points);
+        CHECK(isogi_dvr_set_transfer(dvr, &peaked) == ISOGI_OK && isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK &&
+                  isogi_dvr_sample_visibility(dvr, (const float(*)[3])at, PLACES, v[k][0]) == ISOGI_OK,
+              "peak");
+        CHECK(isogi_dvr_inspect(dvr, &report) == ISOGI_OK && report.grid_points == 33 * 33 * 33, "%zu points", report.grid_points);
+        isogi_dvr_free(dvr);
+    }
+    CHECK(!memcmp(v[0], v[1], sizeof v[0]), "not what brute force has");
+    field_free(&f);
+}
+
 /* Memory that runs out: a code, nothing lost, and the next call goes on to the same bits. */
 TEST(any_allocation_of_several_resolutions_may_fail) {
     field f = field_of(ball, 33);

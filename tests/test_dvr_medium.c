@@ -481,6 +481,205 @@ TEST(planes_and_boxes_cut_pictures_where_they_say) {
     field_free(&f);
 }
 
+/* A ray along a plane is on one side of it all the way: it sees what it would see without the plane, or nothing, of matter and isosurfaces
+   alike, also in the blocks that the plane cuts through. */
+TEST(rays_along_planes_are_kept_or_cut_as_a_whole) {
+    static const double normals[4][3] = {{0, 1, 0}, {0, 0, -2}, {0, 3, 4}, {0, 1, -0.5}};
+    field f = field_of(along_x, 49);
+    const isogi_transfer_point medium = {0, {1, 0.5f, 0.2f}, 0.02f};
+    const isogi_peak peak = {25, {1, 1, 1}, 0.25f};
+    const double eye[3] = {-30, 20.25, 21.5}, target[3] = {60, 20.25, 21.5};
+    for (int n = 0; n < 6 * 2 * 4 * 2; n++) {
+        const int way = n % 6, data = way > 2, peaks = n / 6 % 2, kept = n / 48;
+        const double *normal = normals[n / 12 % 4];
+        const isogi_transfer transfer = {&medium, 1, &peak, (size_t)peaks};
+        const isogi_context context = {.threads = 1, .force_path = n % 5};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)data, .opaque = 1, .bound = way == 2 ? 0.1 : 0,
+                                     .classification = (isogi_dvr_classification)(way == 1 ? 2 : way > 2 ? way - 3 : 0), .step = 0.2};
+        const double off = (kept ? 0.3 : -0.3) - normal[1] * eye[1] - normal[2] * eye[2];
+        const double plane[1][4] = {{normal[0], normal[1], normal[2], off}};
+        const double expected = kept ? 1 - exp(-48 * (double)medium.extinction) * (peaks ? 0.75 : 1) : 0;
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        float c[4];
+        CHECK(isogi_dvr_set_clip(dvr, plane, 1) == ISOGI_OK, "clip");
+        colour_of(dvr, eye, target, NULL, c, NULL);
+        CHECK(fabs((double)c[3] - expected) < 1e-5, "way %d, peaks %d, plane %d: opacity %g, not %g", way, peaks, n / 12 % 4, (double)c[3],
+              expected);
+        const pixel seen = cast(dvr, eye, target, NULL);
+        CHECK(kept ? fabs((double)seen.depth - 30) < 48 : seen.depth > 1e30f, "way %d, plane %d: depth %g", way, n / 12 % 4,
+              (double)seen.depth);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* Rays along an axis beside the box meet nothing, however close they pass. */
+TEST(rays_beside_the_box_meet_nothing) {
+    field f = field_of(along_x, 49);
+    const isogi_transfer_point medium = {0, {1, 0.5f, 0.2f}, 0.02f};
+    const isogi_peak peak = {25, {1, 1, 1}, 0.25f};
+    for (int n = 0; n < 6 * 2 * 6; n++) {
+        const int way = n % 6, data = way > 2, peaks = n / 6 % 2, axis = n / 12 % 3, high = n / 36;
+        const isogi_transfer transfer = {&medium, 1, &peak, (size_t)peaks};
+        const isogi_context context = {.threads = 1, .force_path = n % 5};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)data, .bound = way == 2 ? 0.1 : 0,
+                                     .classification = (isogi_dvr_classification)(way == 1 ? 2 : way > 2 ? way - 3 : 0)};
+        isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+        double eye[3] = {20.25, 21.5, 24}, target[3] = {20.25, 21.5, 24};
+        float c[4];
+        eye[axis] = -30, target[axis] = 60, eye[(axis + 1) % 3] = target[(axis + 1) % 3] = high ? 48.25 : -0.25;
+        colour_of(dvr, eye, target, NULL, c, NULL);
+        const pixel p = cast(dvr, eye, target, NULL);
+        CHECK(!(c[3] > 0) && !(p.c[3] > 0) && p.depth > 1e30f, "way %d, peaks %d, axis %d: opacity %g", way, peaks, axis, (double)p.c[3]);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+/* A tent among many points of the function that all lie within the values of one block: it is seen whichever of them it is. */
+TEST(extinction_at_any_point_of_the_function_is_seen) {
+    field f = field_of(along_x, 49);
+    const double eye[3] = {-30, 20.3, 20.6}, target[3] = {60, 20.3, 20.6};
+    for (int points = 4; points < 14; points += 3)
+        for (int tent = 1; tent < points - 1; tent++)
+            for (int way = 0; way < 2; way++) {
+                isogi_transfer_point p[20];
+                const isogi_transfer transfer = {p, (size_t)points, NULL, 0};
+                const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .step = way ? 0.02 : 0,
+                                             .classification = way ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+                for (int i = 0; i < points; i++) p[i] = (isogi_transfer_point){0.5 + 3.0 * i / (points - 1), {1, 1, 1}, i == tent ? 1 : 0};
+                isogi_dvr *dvr = dvr_new(&desc, &transfer);
+                float c[4];
+                colour_of(dvr, eye, target, NULL, c, NULL);
+                CHECK(fabs(-log1p(-(double)c[3]) - 3.0 / (points - 1)) < 0.01, "point %d of %d, way %d: depth %g, not %g", tent, points,
+                      way, -log1p(-(double)c[3]), 3.0 / (points - 1));
+                isogi_dvr_free(dvr);
+            }
+    field_free(&f);
+}
+
+/* Voxels whose rows and planes go backwards in memory look as the same voxels in order. */
+TEST(volumes_that_lie_backwards_look_the_same) {
+    enum { N = 21, COUNT = N * N * N };
+    static uint8_t bytes[3][COUNT];
+    static uint16_t shorts[3][COUNT];
+    static float floats[3][COUNT];
+    field f = field_waves(N, 5);
+    test_random r = {12};
+    for (int i = 0; i < COUNT; i++) {
+        const int y = N * (N - 1 - i / N % N), z = N * N * (N - 1 - i / N / N), v = (int)(100 + 60 * f.value[i]);
+        const int to[3] = {i, i % N + y + i / N / N * N * N, i % N + y + z};
+        for (int k = 0; k < 3; k++) {
+            bytes[k][to[k]] = (uint8_t)(v < 0 ? 0 : v < 255 ? v : 255);
+            shorts[k][to[k]] = bytes[k][to[k]], floats[k][to[k]] = bytes[k][to[k]];
+        }
+    }
+    const isogi_transfer_point p[] = {{60, {1, 0, 0}, 0}, {100, {0, 1, 0}, 0.3f}, {120, {0, 0, 1}, 0}, {200, {1, 1, 1}, 0.2f}};
+    const isogi_transfer transfer = {p, 4, NULL, 0};
+    for (int n = 0; n < 3 * 2 * 4; n++) {
+        const int type = n % 3, data = n / 3 % 2, path = n / 6 + 1;
+        const isogi_context context = {.threads = 1, .force_path = path};
+        const isogi_view view = view_of(&f, 1, &r, 24);
+        float(*image[3])[4];
+        for (int back = 0; back < 3; back++) { /* as it is, rows backwards, planes too */
+            isogi_volume v = {.type = (const isogi_type[]){ISOGI_U8, ISOGI_U16, ISOGI_F32}[type], .size = {N, N, N}};
+            const ptrdiff_t size = (const ptrdiff_t[]){1, 2, 4}[type];
+            const char *at = type == 0 ? (const char *)bytes[back] : type == 1 ? (const char *)shorts[back] : (const char *)floats[back];
+            isogi_pyramid *pyramid = NULL;
+            v.data = at + (back == 0 ? 0 : back == 1 ? size * N * (N - 1) : size * (COUNT - N));
+            v.stride[0] = size, v.stride[1] = back ? -size * N : size * N, v.stride[2] = back == 2 ? -size * N * N : size * N * N;
+            CHECK(isogi_vol_build(&pyramid, &v, &context) == ISOGI_OK, "build");
+            const isogi_dvr_desc desc = {.pyramid = pyramid, .space = (isogi_dvr_space)data};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            image[back] = picture(dvr, &view, NULL, NULL, NULL);
+            isogi_dvr_free(dvr), isogi_vol_free(pyramid);
+        }
+        for (int back = 1; back < 3; back++)
+            CHECK(largest_difference(image[0], image[back], 24 * 24) < 2e-5, "type %d, space %d, path %d, %d backwards: %g", type, data,
+                  path, back, largest_difference(image[0], image[back], 24 * 24));
+        for (int back = 0; back < 3; back++) free(image[back]);
+    }
+    field_free(&f);
+}
+
+/* ---- what lies at the end of something ---- */
+
+static double two_steps(double x, double y, double z) { return (void)y, (void)z, 48 * x < 20.5 ? 1 : 2; }
+static double plateau(double x, double y, double z) { return (void)y, (void)z, fmin(2 * x, 1); }
+
+/* Where all values of a block are classified alike, whole pieces of a ray within it are passed at once: the one that leaves it is
+   sampled in its middle like all others, whatever lies there. */
+TEST(pieces_that_leave_a_steady_block_are_sampled) {
+    field f = field_of(two_steps, 49);
+    const isogi_transfer_point points[] = {{1, {1, 1, 1}, 0.002f}, {2, {1, 1, 1}, 0.1f}};
+    const isogi_transfer transfer = {points, 2, NULL, 0};
+    const double ends[2][3] = {{-30, 20.3, 20.6}, {90, 20.3, 20.6}};
+    for (int back = 0; back < 2; back++)
+        for (double step = 0.7; step < 4; step += 0.26) {
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1, .classification = ISOGI_DVR_POST_CLASSIFIED, .step = step};
+            isogi_dvr *dvr = dvr_new(&desc, &transfer);
+            double depth = 0;
+            float c[4];
+            for (double from = 0; from < 48; from += step) {
+                const double to = fmin(from + step, 48), x = back ? 48 - 0.5 * (from + to) : 0.5 * (from + to);
+                depth += (to - from) * (0.002 + 0.098 * fmin(fmax(x - 20, 0), 1));
+            }
+            colour_of(dvr, ends[back], ends[!back], NULL, c, NULL);
+            CHECK(fabs(-log1p(-(double)c[3]) - depth) < 1e-4, "step %g, way %d: depth %g, not %g", step, back,
+                  -log1p(-(double)c[3]), depth);
+            isogi_dvr_free(dvr);
+        }
+    field_free(&f);
+}
+
+/* A peak at the largest value of all is met where values reach it, once. */
+TEST(a_peak_at_the_largest_value_is_seen) {
+    field f = field_of(plateau, 33);
+    const double eye[3] = {-30, 20.3, 20.6}, target[3] = {50, 20.3, 20.6};
+    for (int way = 0; way < 5; way++) {
+        const isogi_peak peak = {1, {1, 1, 1}, 0.25f};
+        const isogi_transfer transfer = {NULL, 0, &peak, 1};
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .space = (isogi_dvr_space)(way > 2), .bound = way == 2 ? 0.1 : 0,
+                                     .classification = way % 2 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        const pixel p = cast(dvr, eye, target, NULL);
+        CHECK(fabs((double)p.c[3] - 0.25) < 1e-6 && fabs((double)p.depth - 46) < 1e-4, "way %d: opacity %g, %g off", way, (double)p.c[3],
+              (double)p.depth);
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
+static double floor_and_air(double x, double y, double z) { return (void)x, (void)y, z; }
+
+/* The least of light holds for all of it: in the shadow of a floor from a sky that shines from below, whose series is far below zero, a
+   lamp that does not make up for that adds nothing. Pictures by tables of light, and by samples. */
+TEST(the_least_light_counts_lamps_too) {
+    field f = field_of(floor_and_air, 33);
+    const isogi_transfer_point points[] = {{0, {1, 1, 1}, 50}, {0.1, {1, 1, 1}, 50}, {0.2, {1, 1, 1}, 1e-4f}};
+    const isogi_transfer transfer = {points, 3, NULL, 0};
+    const double eye[3] = {-30, 16, 22}, target[3] = {60, 16, 22};
+    const float sh[12] = {3.5449077f, 3.5449077f, 3.5449077f, 0, 0, 0, -122.8f, -122.8f, -122.8f}; /* 1 - 60 cos */
+    const isogi_light lamp = {.kind = ISOGI_LIGHT_POINT, .vector = {16, 16, 60}, .rgb = {20000, 20000, 20000}};
+    for (int path = 0; path < 5; path++) {
+        float c[2][4];
+        for (int lit = 0; lit < 2; lit++) {
+            const isogi_lighting lighting = {.env = {.sh = sh, .sh_order = 2}, .lights = &lamp, .light_count = (size_t)lit};
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 2, .grid = {5, 5, 5},
+                                         .classification = path == 4 ? ISOGI_DVR_POST_CLASSIFIED : ISOGI_DVR_EXACT};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+            colour_of(dvr, eye, target, &lighting, c[lit], NULL);
+            isogi_dvr_free(dvr);
+        }
+        CHECK(c[0][0] > 0.05f * c[0][3] && c[0][0] < 0.25f * c[0][3], "path %d: the least is %g", path, (double)(c[0][0] / c[0][3]));
+        CHECK(fabsf(c[1][0] / c[0][0] - 1) < 1e-3f, "path %d: light %g, with a lamp %g", path, (double)(c[0][0] / c[0][3]),
+              (double)(c[1][0] / c[1][3]));
+    }
+    field_free(&f);
+}
+
 /* ---- geometry among matter ---- */
 
 /* A wall across the view, given by how far off it is in every pixel, ends rays where a clip plane does; infinitely far walls are none. */

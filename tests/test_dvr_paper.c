@@ -566,4 +566,44 @@ TEST(a_bucky_ball_of_tetrahedra_shows_every_crossing) {
     isogi_dvr_tets_free(built);
 }
 
+/* Beside a voxel without a value blocks hold theirs up to the last voxel that has one. */
+TEST(blocks_hold_the_voxels_beside_one_without_a_value) {
+    field f = field_new(17, 17, 17);
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = 1 + 0.1 * (double)(i % 17);
+    *field_at(&f, 9, 8, 8) = (double)NAN;
+    field_build(&f);
+    const isogi_transfer_point point = {0, {1, 1, 1}, 0.1f};
+    const isogi_transfer transfer = {&point, 1, NULL, 0};
+    const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = ISOGI_DVR_PAPER, .order = 1,
+                                 .directions = 8, .grid = {3, 3, 3}, .reduction = 1};
+    const float at[4][3] = {{8, 8, 8}, {9, 7, 8}, {10, 8, 8}, {8.5f, 8, 8}};
+    isogi_dvr *dvr = dvr_new(&desc, &transfer);
+    float value[4];
+    CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_sample_blocks(dvr, at, 4, value, NULL) == ISOGI_OK, "step");
+    for (int i = 0; i < 3; i++)
+        CHECK(fabs((double)value[i] - (1 + 0.1 * (double)at[i][0])) < 1e-5, "at %g %g: %g", (double)at[i][0], (double)at[i][1],
+              (double)value[i]);
+    CHECK(!test_finite((double)value[3]), "%g between a voxel and one without a value", (double)value[3]);
+    isogi_dvr_free(dvr), field_free(&f);
+}
+
+/* Local visibility is the paper's: pictures by it are refused where another method is at work. */
+TEST(local_pictures_are_for_the_papers_method) {
+    field f = field_waves(17, 3);
+    isogi_view view = {.width = 2, .height = 2, .eye = {40, 8, 8}, .target = {8, 8, 8}, .local = 1};
+    const isogi_lighting sky = {.env = {.sh = sky_one, .sh_order = 1}};
+    for (int method = 0; method <= ISOGI_DVR_SWEEP; method++) {
+        const isogi_dvr_desc desc = {.pyramid = f.pyramid, .shading = ISOGI_DVR_VISIBILITY, .method = (isogi_dvr_method)method, .order = 1,
+                                     .directions = 8, .grid = {3, 3, 3}};
+        const isogi_transfer transfer = {hills, 6, NULL, 0};
+        isogi_dvr *dvr = dvr_new(&desc, &transfer);
+        float image[4][4];
+        CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK, "step");
+        const isogi_result result = isogi_dvr_render(dvr, &view, &sky, image, NULL, NULL);
+        CHECK(result == (method == ISOGI_DVR_PAPER ? ISOGI_OK : ISOGI_INVALID), "method %d: %s", method, isogi_result_string(result));
+        isogi_dvr_free(dvr);
+    }
+    field_free(&f);
+}
+
 TEST_MAIN("dvr_paper")

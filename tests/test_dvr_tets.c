@@ -481,6 +481,60 @@ TEST(tetrahedra_listed_twice_are_seen_once) {
     }
 }
 
+/* In physical space what counts is the length of the way, however much or little values change along it: ten or a tenth within a cube of
+   length 1, through several points of the transfer function. */
+TEST(lengths_count_whatever_values_pass_along_them) {
+    const isogi_tet_desc desc = {.space = ISOGI_DVR_PHYSICAL, .opaque = 1};
+    const double eye[3] = {-2, 0.3, 0.4}, target[3] = {3, 0.3, 0.4};
+    for (double range = 0.1; range < 20; range *= 10) {
+        const isogi_transfer_point p[] = {{0, {1, 0, 0}, 0}, {0.2 * range, {0, 1, 0}, 1}, {0.4 * range, {0, 0, 1}, 0.2f},
+                                          {0.6 * range, {1, 1, 0}, 2}, {range, {1, 1, 1}, 0.5f}};
+        const isogi_transfer transfer = {p, 5, NULL, 0};
+        slope[0] = range, slope[1] = slope[2] = 0;
+        mesh m = lattice_mesh(2, linear, NULL);
+        mesh_build(&m);
+        for (int back = 0; back < 2; back++) {
+            const pixel seen = cast_tets(m.built, &desc, &transfer, back ? target : eye, back ? eye : target);
+            const double expected = 1 - exp(-(0.2 * 0.5 + 0.2 * 0.6 + 0.2 * 1.1 + 0.4 * 1.25));
+            CHECK(fabs((double)seen.c[3] - expected) < 1e-6, "range %g: opacity %g, not %g", range, (double)seen.c[3], expected);
+        }
+        mesh_free(&m);
+    }
+}
+
+/* Parts that overlap: what the second holds is drawn from where the first ends, by the values there, which need be none of the face that
+   it was entered by; and around an eye on the border of one part there is another, if the first ends there. Tetrahedra listed twice have no
+   border of their own. */
+TEST(parts_that_overlap_are_seen_by_their_own_values) {
+    const float points[8][3] = {{0, -5, -5},    {0, 5, -5},    {0, 0, 8},    {1.6f, 0, 0},
+                                {0.5f, -5, -5}, {0.5f, 5, -5}, {0.5f, 0, 8}, {3.5f, 0, 0}};
+    const float values[8] = {1, 1, 1, 1, 0, 0, 0, 3.6f}; /* of the second 1.2 (x - 0.5) */
+    const uint32_t tets[3][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {5, 4, 6, 7}};
+    const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {5, {1, 1, 1}, 1}};
+    const isogi_transfer transfer = {p, 2, NULL, 0};
+    const isogi_tet_desc desc = {.space = ISOGI_DVR_PHYSICAL, .opaque = 1};
+    /* at y = 0.1, z = 0.2 the first ends where 2.3 = 40 (1.6 - x) / 1.6, the second where 2.3 = 40 (3.5 - x) / 3 */
+    const double eye[3] = {-2, 0.1, 0.2}, target[3] = {5, 0.1, 0.2}, first = 1.6 * (1 - 2.3 / 40), last = 3.5 - 3 * 2.3 / 40;
+    for (size_t count = 2; count <= 3; count++) {
+        const isogi_tet_mesh view = {points, values, 8, tets, count};
+        const double depth = 0.2 * (first + 0.6 * (pow(last - 0.5, 2) - pow(first - 0.5, 2)));
+        isogi_tets *built = NULL;
+        isogi_tet_report report;
+        CHECK(isogi_dvr_tets_build(&built, &view, &report, &serial) == ISOGI_OK, "build");
+        CHECK(report.border == 8 && report.crowded == 4 * (count - 2), "%zu faces on the border, %zu crowded", report.border,
+              report.crowded);
+        const pixel seen = cast_tets(built, &desc, &transfer, eye, target);
+        CHECK(fabs((double)seen.c[3] - (1 - exp(-depth))) < 1e-6, "%zu: opacity %g, not %g", count, (double)seen.c[3], 1 - exp(-depth));
+        isogi_dvr_tets_free(built);
+    }
+    mesh m = twice(lattice_mesh(2, one_value, NULL), 0.5);
+    mesh_build(&m);
+    const double on[3] = {1, 0.3, 0.4}, ahead_of_it[3] = {4, 0.3, 0.4};
+    const pixel seen = cast_tets(m.built, &desc, &transfer, on, ahead_of_it);
+    CHECK(fabs((double)seen.c[3] - (1 - exp(-0.2 * 0.5))) < 1e-6, "from the border of one part in another: opacity %g", (double)seen.c[3]);
+    mesh_free(&m);
+}
+
 /* However far a point is that no tetrahedron has, or another part of the mesh: from within a block, from the gap between two and from a
    corner, opacity and the depth at which it begins are those of the blocks. */
 TEST(what_is_far_off_changes_nothing_near_by) {

@@ -64,6 +64,16 @@ TEST(imported_tables_keep_opacity_and_colour) {
 }
 
 /* Where low and high are fewer numbers apart than a table has entries, several points have one value. */
+/* Premultiplied colours above their opacity are those of opacity: 1. */
+TEST(premultiplied_colours_end_at_one) {
+    const float table[2][4] = {{0.5f, 0.2f, 0.25f, 0.25f}, {1, 1, 0, 0.5f}};
+    isogi_transfer_point p[2];
+    CHECK(isogi_transfer_import(table, 2, 0, 1, 1, ISOGI_TABLE_PREMULTIPLIED, p) == ISOGI_OK, "import");
+    for (int a = 0; a < 3; a++)
+        CHECK(fabsf(p[0].rgb[a] - (a == 1 ? 0.8f : 1)) < 1e-6f && fabsf(p[1].rgb[a] - (a < 2)) < 1e-6f, "channel %d: %g, %g", a,
+              (double)p[0].rgb[a], (double)p[1].rgb[a]);
+}
+
 TEST(tables_of_more_entries_than_numbers_are_valid) {
     enum { COUNT = 322 };
     static float table[COUNT][4];
@@ -139,6 +149,35 @@ TEST(suggestions_do_not_count_air_as_a_class) {
         CHECK(threshold > 1.13 && threshold < 1.87 && p[3].value > 2.13 && p[3].value < 3.07, "thresholds %g %g", threshold, p[3].value);
     }
     field_free(&f);
+}
+
+/* Air of a value between two others is no class, but it is no gap between them either: the first threshold parts it from what is below, in
+   the middle of what is empty there. */
+TEST(thresholds_stay_on_their_side_of_air) {
+    field f = field_new(20, 20, 20);
+    isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+    double threshold;
+    for (size_t i = 0; i < field_count(&f); i++) f.value[i] = i % 20 < 4 ? 50 : i % 20 < 16 ? 100 : 200;
+    field_build(&f);
+    CHECK(isogi_transfer_suggest(f.pyramid, ISOGI_DVR_PHYSICAL, p, &threshold) == ISOGI_OK, "suggest");
+    CHECK(threshold > 70 && threshold < 80 && p[3].value < 100, "thresholds %g %g", threshold, p[3].value);
+    field_free(&f);
+}
+
+/* Up to a thousandth of the voxels at an end of the range is left out where that halves it, two are not. */
+TEST(a_thousandth_of_outliers_is_left_out) {
+    for (int n = 0; n < 4; n++) {
+        const int high = n % 2, few = n / 2;
+        field f = field_new(40, 40, 40);
+        isogi_transfer_point p[ISOGI_SUGGEST_POINTS];
+        for (size_t i = 0; i < field_count(&f); i++)
+            f.value[i] = i % (few ? 1200 : 500) == 7 ? (high ? 50 : -49) : (double)(i * 7919 % 1000) / 999;
+        field_build(&f);
+        CHECK(isogi_transfer_suggest(f.pyramid, ISOGI_DVR_PHYSICAL, p, NULL) == ISOGI_OK, "suggest");
+        CHECK(few ? p[0].value > -1 && p[5].value < 2 : high ? p[5].value > 49 : p[0].value < -48, "%s %s: from %g to %g",
+              few ? "few" : "many", high ? "high" : "low", p[0].value, p[5].value);
+        field_free(&f);
+    }
 }
 
 TEST(suggestions_for_odd_volumes_are_valid) {

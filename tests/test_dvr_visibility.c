@@ -727,6 +727,34 @@ SLOW_TEST(sheets_are_lit_on_the_side_that_is_seen) {
     isogi_vol_free(pyramid);
 }
 
+/* An opaque sheet upon grid points: what it shows of light is that of the points before it, on either side, as it is where no point lies
+   upon it. */
+TEST(sheets_upon_grid_points_are_lit_from_their_own_side) {
+    isogi_pyramid *pyramid = NULL;
+    for (int i = 0; i < N * N * N; i++) data[i / N / N][i / N % N][i % N] = (float)(i % N);
+    const isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {N, N, N}};
+    CHECK(isogi_vol_build(&pyramid, &volume, &serial) == ISOGI_OK, "build");
+    for (int back = 0; back < 2; back++) {
+        const isogi_light sun = {.kind = ISOGI_LIGHT_DIRECTIONAL, .vector = {back ? 1 : -1, 0.2f, 0.1f}, .rgb = {3, 3, 3}};
+        const isogi_lighting lighting = {.lights = &sun, .light_count = 1};
+        const isogi_view view = {.width = 1, .height = 1, .eye = {back ? 90 : -40, 20, 28}, .target = {24, 20, 28}};
+        float pixel[2][1][4];
+        for (int upon = 0; upon < 2; upon++) {
+            const isogi_peak peak = {upon ? 24 : back ? 23 : 25, {1, 1, 1}, 1}; /* points at 0, 12, 24 ... */
+            const isogi_transfer transfer = {NULL, 0, &peak, 1};
+            const isogi_dvr_desc desc = {
+                .pyramid = pyramid, .shading = ISOGI_DVR_VISIBILITY, .order = 3, .grid = {5, 5, 5}, .directions = 64};
+            isogi_dvr *dvr = renderer(desc, &transfer, &serial);
+            CHECK(isogi_dvr_step(dvr, 0, NULL) == ISOGI_OK && isogi_dvr_render(dvr, &view, &lighting, pixel[upon], NULL, NULL) == ISOGI_OK,
+                  "render");
+            isogi_dvr_free(dvr);
+        }
+        CHECK(pixel[0][0][0] > 0.1f && fabsf(pixel[1][0][0] / pixel[0][0][0] - 1) < 0.3f, "side %d: light %g upon points, %g beside", back,
+              (double)pixel[1][0][0], (double)pixel[0][0][0]);
+    }
+    isogi_vol_free(pyramid);
+}
+
 /* Within a closed opaque peak it is dark, whatever shines outside. */
 TEST(closed_sheets_let_no_light_in) {
     isogi_pyramid *pyramid = NULL;

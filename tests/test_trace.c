@@ -1701,4 +1701,25 @@ TEST(caps_face_outwards_wherever_rays_start) {
     scene_free(&s);
 }
 
+/* Of texels whose isovalues are equally close, the nearest is read. */
+TEST(of_equal_isovalues_the_nearest_texel_is_read) {
+    double q[1] = {4.5};
+    scene s = scene_make(9, 9, 9, NULL, ground, q);
+    const isogi_light lamp = light_make(ISOGI_LIGHT_POINT, 1, 12, 2, 300, 0);
+    isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+    isogi_trace *t = NULL;
+    memset(&d.lighting, 0, sizeof d.lighting);
+    d.lighting.lights = &lamp, d.lighting.light_count = 1, d.lookup = ISOGI_TRACE_CLOSEST_ISOVALUE;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+    for (int i = 0; i < 64; i++) {
+        const float x = (float)(i % 4) / 3, z = (float)(i / 4 % 4) / 3, at = (float)(2 + i / 16);
+        const float near_x = x < 0.5f ? at : at + 1, near_z = z < 0.5f ? 3 : 4;
+        const float points[2][3] = {{at + 0.1f + 0.8f * x, 4, 3.1f + 0.8f * z}, {near_x, 4, near_z}};
+        float e[2][3];
+        CHECK(isogi_trace_sample(t, points, 2, e, NULL) == ISOGI_OK && e[1][0] > 0.1f && !memcmp(e[0], e[1], sizeof e[0]),
+              "at %g %g: light %g, of the nearest texel %g", (double)points[0][0], (double)points[0][2], (double)e[0][0], (double)e[1][0]);
+    }
+    isogi_trace_free(t), scene_free(&s);
+}
+
 TEST_MAIN("trace")

@@ -2150,4 +2150,53 @@ TEST(surfaces_beside_a_mask_are_lit) {
     scene_free(&s);
 }
 
+/* While anything remains to be done some texel is said to be wanted, of the second side, too, and afterwards none. Path-traced, a texel
+   that is wanted has no light where it alone is read, one that is done has. */
+TEST(what_remains_is_wanted) {
+    double q[4] = {5, 5, 5, 3};
+    scene s = scene_make(11, 11, 11, NULL, ball, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+    for (int both = 0; both < 2; both++) {
+        isogi_trace *t = NULL;
+        double remaining = 1;
+        int steps = 0, early = 0;
+        d.sides = both ? ISOGI_TRACE_BOTH_SIDES : ISOGI_TRACE_LOW_SIDE;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
+        for (; remaining > 0 && steps < 10000; steps++) {
+            size_t texel[3], wanted = 0;
+            CHECK(isogi_trace_step(t, 400, &remaining) == ISOGI_OK, "step");
+            for (texel[2] = 0; texel[2] < 11; texel[2]++)
+                for (texel[1] = 0; texel[1] < 11; texel[1]++)
+                    for (texel[0] = 0; texel[0] < 11; texel[0]++) {
+                        const float at[1][3] = {{(float)texel[0], (float)texel[1], (float)texel[2]}};
+                        const int is_wanted = isogi_trace_wanted(t, texel);
+                        float e[1][3], error;
+                        wanted += (size_t)is_wanted;
+                        if (both || steps % 8 || !isogi_trace_valid(t, texel)) continue;
+                        isogi_trace_sample(t, at, 1, e, &error), early += is_wanted;
+                        CHECK(test_finite((double)error) == !is_wanted, "a texel that is %s has light of error %g",
+                              is_wanted ? "wanted" : "done", (double)error);
+                    }
+            CHECK((wanted > 0) == (remaining > 0), "%d texels wanted, %g remain", (int)wanted, remaining);
+        }
+        CHECK(steps > 8 && (both || early > 100), "%d steps, %d texels seen early", steps, early);
+        isogi_trace_free(t);
+    }
+    scene_free(&s);
+}
+
+/* The memory of a texture of both sides is that of either. */
+TEST(memory_counts_both_sides) {
+    double q[4] = {5, 5, 5, 3};
+    scene s = scene_make(11, 11, 11, NULL, ball, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 1);
+    isogi_trace *t = NULL, *both = NULL;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "low side");
+    d.sides = ISOGI_TRACE_BOTH_SIDES;
+    CHECK(isogi_trace_create(&both, &d, NULL) == ISOGI_OK && isogi_trace_step(both, 0, NULL) == ISOGI_OK, "both sides");
+    const size_t low = isogi_trace_memory(t), high = isogi_trace_memory(isogi_trace_high(both)), all = isogi_trace_memory(both);
+    CHECK(low > 1000 && high > 1000 && all == low + high, "%zu and %zu bytes, together %zu", low, high, all);
+    isogi_trace_free(t), isogi_trace_free(both), scene_free(&s);
+}
+
 TEST_MAIN("trace_bake")

@@ -998,4 +998,19 @@ TEST(every_allocation_of_a_lighting_may_fail) {
     scene_free(&s);
 }
 
+/* Errors refer to the brightest glow that there may be: where it changes all texels are computed again, those that have another colour
+   than the one that changes, too. */
+TEST(the_brightest_glow_is_part_of_all_errors) {
+    double q[4] = {4, 4, 4, 2.6};
+    scene s = scene_make(9, 9, 9, NULL, ball, q);
+    isogi_albedo_point glow[2][3] = {{{-5, {1, 2, 3}}, {1, {1, 2, 3}}, {5, {9, 9, 9}}},
+                                     {{-5, {1, 2, 3}}, {1, {1, 2, 3}}, {5, {30, 40, 50}}}};
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 4);
+    d.isovalue_min = -0.5, d.isovalue_max = 0.5, d.emission_points = glow[0], d.emission_count = 3;
+    isogi_trace *t = baked(&d);
+    d.emission_points = glow[1];
+    CHECK(isogi_trace_change(t, &d) == ISOGI_OK && finished(t, &d, "another glow elsewhere").texels > 50, "change");
+    isogi_trace_free(t), scene_free(&s);
+}
+
 TEST_MAIN("trace_change")

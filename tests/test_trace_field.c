@@ -67,6 +67,30 @@ static int analytic_points(const analytic *a, int count, uint64_t seed, float (*
     return found;
 }
 
+/* A ceiling at y = 2.1, whose normal points down. */
+static void ceiling_intersect(void *user, const isogi_ray *rays, size_t count, isogi_trace_surface *surfaces) {
+    (void)user;
+    for (size_t i = 0; i < count; i++) {
+        if (!(rays[i].dir[1] > 0)) continue;
+        surfaces[i].t = (2.1 - rays[i].origin[1]) / (double)rays[i].dir[1], surfaces[i].normal[1] = -1;
+        if (!(surfaces[i].t > 0)) surfaces[i].t = 0; /* tmax is not looked at: what lies beyond it is left out */
+    }
+}
+
+/* Lamps just below a ceiling, closer to it than rays start off the surface: a shadow ray ends at the lamp, wherever it starts, and light is
+   that at the point itself. */
+TEST(shadow_rays_end_at_lamps_close_to_what_is_behind_them) {
+    const float points[1][3] = {{0, 0, 0}}, up[1][3] = {{0, 2, 0}};
+    for (int i = 0; i < 4; i++) {
+        const isogi_light lamp = light_make(i & 1 ? ISOGI_LIGHT_SPHERE : ISOGI_LIGHT_POINT, 0.5 * i, 2, 0.3, 10, i & 1 ? 0.01 : 0);
+        const isogi_trace_desc d = {.lighting = {.lights = &lamp, .light_count = 1}, .samples = 64, .offset = 0.25f};
+        const double away = length3(0.5 * i, 2, 0.3), expected = 10 * 2 / (away * away * away);
+        float e[1][3];
+        CHECK(isogi_trace_gather_field(&d, ceiling_intersect, NULL, points, up, 1, e, NULL, NULL) == ISOGI_OK, "gather");
+        CHECK(fabs((double)e[0][0] - expected) < 0.02 * expected, "lamp %d: E %g, not %g", i, (double)e[0][0], expected);
+    }
+}
+
 /* Closed forms: a plane below a black sphere, E = pi (1 - (r/d)^2 cos t) (2 %, four standard errors), and the white furnace. */
 TEST(analytic_sphere_and_plane) {
     double q[5] = {16, 16, 16, 4, 6}, worst = 0;

@@ -268,6 +268,49 @@ TEST(rectangle_next_to_the_surface_and_from_behind) {
     scene_free(&s);
 }
 
+/* A rectangle so small in the sky that its area is drawn from shines by the cosine to its normal, too. */
+TEST(rectangles_far_off_shine_by_the_cosine_to_their_normal) {
+    double q[1] = {8}, u[3] = {0, 0, 12}, v[3] = {-12, 0, 0};
+    scene s = scene_make(33, 33, 33, NULL, ground, q);
+    const float p[3] = {15, 8, 17};
+    for (int i = 0; i < 5; i++) {
+        const double to[3] = {1000.0 * i, 3000, -400.0 * i}, centre[3] = {15 + to[0], 8 + to[1], 17 + to[2]};
+        const double d = length3(to[0], to[1], to[2]), expected = 16e6 * to[1] * to[1] / (d * d * d * d);
+        isogi_light light = rectangle_make(centre, v, u, 16e6);
+        double e = lit(&s, &light, p, 0, 64);
+        if (!(e > 0)) light = rectangle_make(centre, u, v, 16e6), e = lit(&s, &light, p, 0, 64);
+        CHECK(fabs(e - expected) < 1e-3 * expected, "aslant %d: E %.7f, expected %.7f", i, e, expected);
+    }
+    scene_free(&s);
+}
+
+/* A rectangle that turns its back to the middle of the volume is light all the same: what errors and short formats refer to is not 0, and
+   bytes hold what it brings. */
+TEST(rectangles_that_shine_away_from_the_middle_count) {
+    double q[1] = {8}, centre[3] = {2, 10, 2}, u[3] = {0, 0, 1}, v[3] = {1, 0, 0};
+    scene s = scene_make(33, 33, 33, NULL, ground, q);
+    const float p[1][3] = {{2, 8, 2}};
+    double e = 0;
+    for (int turned = 0; turned < 2; turned++) {
+        const isogi_light light = turned ? rectangle_make(centre, v, u, 3000) : rectangle_make(centre, u, v, 3000);
+        isogi_trace_desc d = desc_make(&s, 0, 0, 64);
+        isogi_trace_report report;
+        isogi_trace *t = NULL;
+        float light_there[1][3];
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.lights = &light, d.lighting.light_count = 1, d.lazy = 1, d.storage = ISOGI_TRACE_BYTE;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_request(t, p, 1) == ISOGI_OK &&
+                  isogi_trace_step(t, 0, NULL) == ISOGI_OK && isogi_trace_sample(t, p, 1, light_there, NULL) == ISOGI_OK,
+              "bake");
+        isogi_trace_status(t, &report);
+        CHECK(report.unit > 0.1, "turned %d: unit %g", turned, report.unit);
+        e = fmax(e, (double)light_there[0][0]);
+        isogi_trace_free(t);
+    }
+    CHECK(e > 20, "E %g below the lamp", e);
+    scene_free(&s);
+}
+
 /* ---- emission -------------------------------------------------------------------------------------------------------------- */
 
 /* A glowing closed cavity: E = pi L / (1 - R), however it is baked; R = 1 truly diverges: what is computed is finite and says so. */

@@ -952,4 +952,67 @@ TEST(blocks_are_loaded_whole_or_not_at_all) {
     isogi_trace_free(whole), free(block), scene_free(&s);
 }
 
+/* RGB9E5: no channel is off by more than half a step, which is 1/512 of the power of two
+   above the largest; and just below one, which the largest is rounded up to, of the next, but for the largest itself. */
+TEST(shared_exponents_round_to_the_nearest) {
+    double q[1] = {2.5};
+    scene s = scene_make(5, 5, 5, NULL, ground, q);
+    const float points[1][3] = {{2, 2, 2}};
+    double worst = 0;
+    for (int i = 0; i < 100; i++) {
+        const float bright = 0.97f + 0.0004f * (float)i;
+        isogi_light sun = light_make(ISOGI_LIGHT_DIRECTIONAL, 0, 1, 0, 1, 0);
+        isogi_trace_desc d = desc_make(&s, 0, 0, 1);
+        isogi_trace *t = NULL;
+        float e[1][3];
+        memset(&d.lighting, 0, sizeof d.lighting);
+        d.lighting.lights = &sun, d.lighting.light_count = 1, d.storage = ISOGI_TRACE_RGB9E5;
+        sun.rgb[0] = bright, sun.rgb[1] = 0.7f * bright, sun.rgb[2] = 0.1f;
+        CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK &&
+                  isogi_trace_sample(t, points, 1, e, NULL) == ISOGI_OK,
+              "bake");
+        for (int c = 0; c < 3; c++) {
+            const double off = fabs((double)e[0][c] - (double)sun.rgb[c]), half = bright > (c ? 0.999f : 1) ? 0x1p-9 : 0x1p-10;
+            worst = fmax(worst, off / half);
+            CHECK(off <= 1.001 * half, "light %g, channel %d: %g, not %g", (double)bright, c, (double)e[0][c], (double)sun.rgb[c]);
+        }
+        isogi_trace_free(t);
+    }
+    CHECK(worst > 0.9, "off by %g of half a step at most", worst);
+    scene_free(&s);
+}
+
+static uint64_t number_at(const uint8_t *from) {
+    uint64_t x = 0;
+    for (int i = 0; i < 8; i++) x |= (uint64_t)from[i] << 8 * i;
+    return x;
+}
+
+/* A block whose hash is right is looked at all the same: bricks that come twice and records that are no numbers are not loaded. */
+TEST(blocks_of_a_right_hash_are_checked) {
+    enum { HEADER = 56 };
+    double q[4] = {8, 8, 8, 5};
+    scene s = scene_make(17, 17, 17, NULL, ball, q);
+    isogi_trace_desc d = desc_make(&s, 0.5f, 1, 2);
+    isogi_trace *t = NULL;
+    d.storage = ISOGI_TRACE_HALF, d.isovalue_min = -0.1, d.isovalue_max = 0.1;
+    CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK && isogi_trace_step(t, 0, NULL) == ISOGI_OK, "bake");
+    const size_t size = isogi_trace_save_size(t);
+    uint8_t *block = (uint8_t *)malloc(size);
+    CHECK(size > 500 && isogi_trace_save(t, block, size) == ISOGI_OK && isogi_trace_load(t, block, size) == ISOGI_OK, "save");
+    for (int k = 0; k < 3; k++) {
+        uint64_t hash = 0xcbf29ce484222325u, mask = number_at(block + HEADER + 8);
+        size_t next = HEADER + 16;
+        CHECK(isogi_trace_save(t, block, size) == ISOGI_OK, "save");
+        for (; mask; mask &= mask - 1) next += 8; /* an error and three halves each */
+        if (k == 1) memcpy(block + next, block + HEADER, 8);
+        if (k == 2) block[HEADER + 16 + 4] = 0, block[HEADER + 16 + 5] = 0x7c;
+        for (size_t i = 0; i < size - 8; i++) hash = (hash ^ block[i]) * 0x100000001b3u;
+        for (int i = 0; i < 8; i++) block[size - 8 + (size_t)i] = (uint8_t)(hash >> 8 * i);
+        CHECK(isogi_trace_load(t, block, size) == (k ? ISOGI_CORRUPT : ISOGI_OK), "%s is loaded, or nothing is",
+              k == 1 ? "a brick that comes twice" : "an infinite number");
+    }
+    free(block), isogi_trace_free(t), scene_free(&s);
+}
+
 TEST_MAIN("trace_store")

@@ -800,4 +800,29 @@ TEST(a_pyramid_knows_whether_all_voxels_are_finite) {
     }
 }
 
+/* Bounds count in: a box of one value may hold an interval that begins or ends there, and none beside it; so do pieces of rays. A piece
+   does not begin before its ray does, wherever it is looked for. */
+TEST(intervals_that_touch_a_value_hold_it) {
+    static float data[20][20][20];
+    isogi_volume volume = {.data = data, .type = ISOGI_F32, .size = {20, 20, 20}};
+    isogi_pyramid *p = NULL;
+    for (int i = 0; i < 8000; i++) data[i / 400][i / 20 % 20][i % 20] = 5;
+    CHECK(isogi_vol_build(&p, &volume, NULL) == ISOGI_OK, "build");
+    for (int k = 0; k < 4; k++) {
+        const double range[1][2] = {{(const double[]){3, 5, 3, 5.5}[k], (const double[]){5, 8, 4.5, 8}[k]}};
+        const size_t boxes[2][2][3] = {{{0, 0, 0}, {19, 19, 19}}, {{3, 5, 7}, {6, 6, 18}}};
+        isogi_ray ray = {.origin = {-5, 7.3, 9.1}, .dir = {1, 0, 0}, .tmin = 9, .tmax = 20};
+        double piece[2];
+        for (int b = 0; b < 2; b++)
+            CHECK(isogi_vol_may_hold(p, boxes[b][0], boxes[b][1], range, 1) == (k < 2), "box %d, %g to %g", b, range[0][0], range[0][1]);
+        for (int from = 0; from < 3; from++) {
+            const double start = (const double[]){-100, 0, 12}[from], begin = fmax(start, 9);
+            const int found = isogi_vol_next_interval(p, &ray, range, 1, start, piece, NULL);
+            CHECK(found == (k < 2) && (!found || (fabs(piece[0] - begin) < 1e-9 && fabs(piece[1] - 20) < 1e-9)),
+                  "from %g, %g to %g: %d, %g to %g", start, range[0][0], range[0][1], found, piece[0], piece[1]);
+        }
+    }
+    isogi_vol_free(p);
+}
+
 TEST_MAIN("vol_api")
