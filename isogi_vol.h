@@ -247,7 +247,8 @@ typedef struct isogi_volume {
     isogi_type type;
     size_t size[3];      /* voxels along x, y, z; each 1 .. 2^31-1 */
     ptrdiff_t stride[3]; /* bytes from voxel to voxel along x, y, z, multiples of the type's size; all 0 = packed, x fastest,
-                            halo included; a single 0 repeats one voxel along that axis */
+                            halo included; a single 0 repeats one voxel along that axis. Where another axis than x is contiguous in
+                            memory pyramids take six to eleven times as long to build: let that one be x, and `axes` turn it */
     double spacing[3];   /* > 0; 0 = 1 */
     double origin[3];    /* world position of voxel (0,0,0), of that of the larger field for a chunk */
     double axes[9];      /* row-major 3x3, column a = world direction of grid axis a; all 0 = identity; its determinant finite and above
