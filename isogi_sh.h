@@ -2651,7 +2651,8 @@ ISOGI_SH__APART isogi_result isogi_sh__eval_soa(void *basis, int is_double, int 
         const float *x32 = (const float *)x + i, *y32 = (const float *)y + i, *z32 = (const float *)z + i;
         const double *x64 = (const double *)x + i, *y64 = (const double *)y + i, *z64 = (const double *)z + i;
         isogi_sh__unit u[ISOGI_SH__LANES];
-        size_t lanes = count - i < ISOGI_SH__LANES ? count - i : ISOGI_SH__LANES, few = 0, k;
+        size_t few = 0;
+        int k, lanes = count - i < ISOGI_SH__LANES ? (int)(count - i) : ISOGI_SH__LANES;
 #ifdef ISOGI_SH__VECTORS
         if (!is_double) {
             few = isogi_sh__eval_columns_f32((float *)basis + i, count, order, x32, y32, z32, count - i);
@@ -2664,14 +2665,13 @@ ISOGI_SH__APART isogi_result isogi_sh__eval_soa(void *basis, int is_double, int 
             if (!few) few = isogi_sh__eval_few_f64((double *)basis + i, count, 1, order, x64, y64, z64, 1, count - i);
         }
 #endif
-        if (few) lanes = few;
-        else {
-            for (k = 0; k < lanes; k++)
-                u[k] = is_double ? isogi_sh__normalise(x64[k], y64[k], z64[k])
-                                 : isogi_sh__normalise((double)x32[k], (double)y32[k], (double)z32[k]);
-            isogi_sh__eval_block(&out, i, (int)lanes, order, u);
-        }
-        i += lanes;
+        i += few;
+        if (few) continue;
+        for (k = 0; k < lanes; k++)
+            if (is_double) u[k] = isogi_sh__normalise(x64[k], y64[k], z64[k]);
+            else u[k] = isogi_sh__normalise((double)x32[k], (double)y32[k], (double)z32[k]);
+        isogi_sh__eval_block(&out, i, lanes, order, u);
+        i += (size_t)lanes;
     }
     return ISOGI_OK;
 }
