@@ -220,12 +220,12 @@
    space, exact or pre-integrated, any number), 2^16 directions, 2^24 samples on the longest ray, and eyes up to 1e17 voxels away.
    Pre-integrated pictures of physical space tell up to 16384 classes of values apart, of those that occur and on which the transfer
    function depends: a piece of it that is narrower than four of them keeps its opacity, blurred over a class; regions of exactly a step's
-   value, such as labels, have what begins there, if no point is that close. They do where the span of these values is 1e-26 to 1e30 and, of
-   floats and doubles, at least a 4096th of their distance from zero, and where no voxel is beyond floats; else pictures are
-   post-classified, in double, which takes longer: subtract what values have in common, or let `scale` and `bias` make them of others. With
-   spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors: ISOGI_INVALID for anything outside of its
-   documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which), ISOGI_TOO_LARGE where sizes overflow or pass these
-   limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
+   value, such as labels, have what begins there, and so have values less than a class below it, if no point is that close. They do where
+   the span of these values is 1e-26 to 1e30 and, of floats and doubles, at least a 4096th of their distance from zero, and where no voxel
+   is beyond floats; else pictures are post-classified, in double, which takes longer: subtract what values have in common, or let `scale`
+   and `bias` make them of others. With spans beyond that, or voxels beyond floats, visibility is by brute force, too. Errors: ISOGI_INVALID
+   for anything outside of its documented range (isogi_dvr_fault, isogi_view_fault, isogi_transfer_fault say which), ISOGI_TOO_LARGE where
+   sizes overflow or pass these limits, ISOGI_NO_MEMORY, ISOGI_CANCELLED.
 
    How to choose. `step` 0.5 is right for smooth transfer functions, 0.25 for steep ones; each halving costs twice the time and
    leaves a quarter of the error. `order` 2 is ambient light with a direction, 3 soft shadows, 4 and more for a directional light.
@@ -6516,15 +6516,20 @@ static void isogi_dvr__frame_classes(isogi_dvr__frame *f, double low, double sca
     const isogi_dvr *d = f->dvr;
     size_t i, next = 0, classes[2];
     double ends[2], step;
+    int a;
     for (i = 0; i < f->count; i++) {
         isogi_dvr__class_ends(d, low, scale, i, f->count, ends);
         isogi_dvr__mean_light(&d->transfer, ends[0], ends[1], f->classes[i].mean);
     }
     isogi_dvr__sum_classes(f);
     while (isogi_dvr__next_step(d, low, scale, f->count, &next, &step, classes))
-        for (i = classes[0]; i <= classes[1]; i++) {
+        for (i = classes[1] + 1; i-- > classes[0];) { /* integrals from the step on stay what they were */
+            isogi_dvr__class_entry *e = &f->classes[i];
             isogi_dvr__class_ends(d, low, scale, i, f->count, ends);
-            isogi_dvr__mean_light(&d->transfer, step, ends[1] > step ? ends[1] : step, f->classes[i].mean);
+            isogi_dvr__mean_light(&d->transfer, step, ends[1] > step ? ends[1] : step, e->mean);
+            for (a = 0; a < 4; a++)
+                e->rest[a] = (float)(((double)e[1].before[a] - (double)e->before[a]) * (double)f->quantum[a] + (double)e[1].rest[a] -
+                                     (double)e->mean[a]);
         }
     for (i = 0; i < f->count; i++) {
         const isogi_dvr__class_entry *e = &f->classes[i];

@@ -4160,13 +4160,12 @@ ISOGI_API isogi_result isogi_sh_cosine_zonal(float *zonal, int order) {
 static void isogi_sh__zonal_low(float *c, int order, const float *zonal, const float d[3]) {
     static const double factor[ISOGI_SH__UNROLLED_ORDER] = {3.5449077018110321, 2.0466534158929770, 1.5853309190424045,
                                                             1.3398491713813586, 1.1816359006036774};
-    double y[ISOGI_SH__UNROLLED_ORDER * ISOGI_SH__UNROLLED_ORDER];
+    double y[ISOGI_SH__UNROLLED_ORDER * ISOGI_SH__UNROLLED_ORDER], scale[ISOGI_SH__UNROLLED_ORDER];
     int l, i;
     isogi_sh__eval_low(y, order, isogi_sh__normalise_f32(d), 0);
-    for (l = i = 0; l < order; l++) {
-        double scale = factor[l] * (double)zonal[l];
-        for (; i < (l + 1) * (l + 1); i++) c[i] = (float)(scale * y[i]);
-    }
+    for (l = 0; l < order; l++) scale[l] = factor[l] * (double)zonal[l]; /* c may be where zonal is */
+    for (l = i = 0; l < order; l++)
+        for (; i < (l + 1) * (l + 1); i++) c[i] = (float)(scale[l] * y[i]);
 }
 
 /* Kept out of the caller, whose fast way would pay for its registers. */

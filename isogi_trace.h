@@ -5357,12 +5357,12 @@ static size_t isogi_trace__solver_set(const isogi_trace *t, isogi_trace__solver 
     return used;
 }
 
-/* Light of the probes, which the solver begins with, and ends with. */
+/* Light of the probes, which the solver begins with, and ends with: that of those that rest stays as it is, however often it is at work. */
 static void isogi_trace__solver_light(const isogi_trace *t, int ends) {
     const isogi_trace__set *set = &t->feedback->probes;
     const size_t v = (size_t)t->values;
     size_t i, a;
-    for (i = 0; i < set->count; i++) {
+    for (i = ends ? isogi_trace__resting_probes(t->feedback) : 0; i < set->count; i++) {
         float *out = isogi_trace__light_at(set, i, v);
         double *light = t->feedback->solver->light + i * v;
         for (a = 0; a < v; a++)
@@ -5571,8 +5571,8 @@ static void isogi_trace__guide_begin(const isogi_trace *t, const isogi_trace__no
     int a;
     isogi_trace__slopes(&t->scene, &n->place, slope);
     for (a = 0; a < 3; a++) slope[a] *= t->step[a];
+    memset(g, 0, sizeof *g); /* until it has samples; it may never, where a block is loaded that has its light */
     g->isovalue = n->isovalue, g->steep = isogi_trace__magnitude(slope);
-    g->pilot = g->pilot_variance = 0; /* until it has samples */
     if (!isogi_trace__coloured(d)) return;
     for (a = 0; a < 3; a++) texel[a] = n->texel[a];
     isogi_trace__texel_grid(t, texel, point);
@@ -5675,6 +5675,7 @@ static void isogi_trace__guide_task(void *arg, size_t task) {
    in the largest one, its variance in the square of that: squares of either need not be numbers. */
 typedef struct isogi_trace__dense {
     double unit; /* of luminance */
+    size_t filtered; /* texels, by this task */
     int count;
     int tinted; /* colours differ by isovalue or by place */
     int series; /* light is transfer: its first coefficient is the luminance, the next three are the mean, in the same unit, */
@@ -6140,7 +6141,7 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
         isogi_trace__blend blend;
         if (!node || !(first_round ? isogi_trace__node_at(set, node - 1)->samples > 0 : isogi_trace__unpublished(t, node - 1))) continue;
         if (!filled) isogi_trace__block_fill(t, brick, b);
-        filled = 1;
+        filled = 1, b->filtered++;
         isogi_trace__blend_of(t, b, first + slot % 4 + ISOGI_TRACE__ROW * (slot / 4 % 4 + ISOGI_TRACE__ROW * (slot / 16)), &blend);
         if (b->series && blend.alike > 0) isogi_trace__blend_series(t, b, node - 1, &blend);
         blend.variance *= b->unit * b->unit;
@@ -6288,7 +6289,7 @@ static size_t isogi_trace__phase_tasks(const isogi_trace__feedback *f) {
 }
 
 /* Rays that take as long as one of them: one for 64 hits, for 8 nodes that are read in passing, for 2 that are filtered (of transfer for
-   8 of their values, too) or given back, for 64 that rest. */
+   8 of their values, too) or given back, for 64 that rest; bricks are filtered as if none rested, see isogi_trace__carry. */
 static uint64_t isogi_trace__phase_cost(const isogi_trace *t, size_t task) {
     const isogi_trace__feedback *f = t->feedback;
     const isogi_trace__segment *s = f->phase == ISOGI_TRACE__PASS ? f->probes.segments : f->texels.segments; /* NULL without hits */
@@ -6296,7 +6297,8 @@ static uint64_t isogi_trace__phase_cost(const isogi_trace *t, size_t task) {
     if (f->phase == ISOGI_TRACE__PASS) return s[task].entries / 8 + s[task].hits / 64 + 1;
     if (f->phase == ISOGI_TRACE__BOUNCE)
         return ISOGI_TRACE__SWEEP / 8 + s[f->segment].hits * ISOGI_TRACE__SWEEP / s[f->segment].entries / 64;
-    if (f->phase != ISOGI_TRACE__DIRECT && f->phase != ISOGI_TRACE__FORGET && (task + 1) * ISOGI_TRACE__SWEEP <= isogi_trace__resting(f))
+    if (f->phase != ISOGI_TRACE__DIRECT && f->phase != ISOGI_TRACE__FORGET && (task + 1) * ISOGI_TRACE__SWEEP <= isogi_trace__resting(f) &&
+        (!isogi_trace__publishing(f) || t->scene.desc.unfiltered))
         return ISOGI_TRACE__SWEEP / 64;
     if (isogi_trace__publishing(f) && t->scene.desc.mode == ISOGI_TRACE_TRANSFER && !t->scene.desc.unfiltered)
         return ISOGI_TRACE__SWEEP / 2 + ISOGI_TRACE__SWEEP / 8 * (uint64_t)t->values;
@@ -6356,7 +6358,18 @@ static void isogi_trace__phase_end(isogi_trace *t) {
     }
 }
 
-/* The next tasks of the phase at work, about as long as `limit` rays, at least one. Returns what they count as. */
+/* What sweeps of bricks took that are filtered, of which some rested: known when they are done. */
+static uint64_t isogi_trace__filtered_cost(const isogi_trace *t) {
+    const isogi_trace__feedback *f = t->feedback;
+    const isogi_trace__dense *blocks = (const isogi_trace__dense *)(const void *)f->casts;
+    uint64_t cost = ISOGI_TRACE__SWEEP / 64 * (uint64_t)f->sweeps, filtered = 0;
+    size_t i;
+    for (i = 0; i < isogi_trace__publish_tasks(f); i++) filtered += blocks[i].filtered;
+    return cost + filtered / 2 + (t->scene.desc.mode == ISOGI_TRACE_TRANSFER ? filtered / 8 * (uint64_t)t->values : 0);
+}
+
+/* The next tasks of the phase at work, about as long as `limit` rays or, where bricks may rest, shorter; at least one. Returns what they
+   count as. */
 static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     isogi_trace__feedback *f = t->feedback;
     const size_t counts = ISOGI_TRACE__CASTS * sizeof *f->casts / sizeof(isogi_trace__finished); /* that lie where rays did */
@@ -6371,6 +6384,7 @@ static uint64_t isogi_trace__carry(isogi_trace *t, uint64_t limit) {
     else if (count) {
         f->sweeps = count;
         isogi_parallel(&silent, isogi_trace__publishing(f) ? isogi_trace__publish_tasks(f) : count, isogi_trace__phase_task, t, 0, 1);
+        if (isogi_trace__publishing(f) && !t->scene.desc.unfiltered && isogi_trace__resting(f)) cost = isogi_trace__filtered_cost(t);
     }
     if (f->phase == ISOGI_TRACE__FINISH) isogi_trace__finish_count(t, count);
     f->carried += count;
@@ -6535,10 +6549,11 @@ static isogi_result isogi_trace__nodes_make(isogi_trace *t, uint64_t limit, uint
     return result;
 }
 
-/* To be called before there is something to do: all nodes that there are have been finished. */
+/* To be called before there is something to do: all nodes that there are have been finished, unless a block that was loaded has what they
+   were for, while their light was not yet carried over. */
 static void isogi_trace__settle(const isogi_trace *t) {
     isogi_trace__feedback *f = t->feedback;
-    if (!f || t->wanted) return;
+    if (!f || t->wanted || f->unpublished) return;
     f->settled = f->texels.count, f->settled_probes = f->probes.count;
     f->settled_segments[0] = f->texels.segment_count, f->settled_segments[1] = f->probes.segment_count;
     f->stirred = f->diverges || t->scene.desc.bounces > 1; /* they have no more reflections than those have to come */

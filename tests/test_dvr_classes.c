@@ -534,6 +534,36 @@ TEST(labels_at_steps_have_all_that_begins_there) {
     }
 }
 
+/* Random labels, and waves, none of which lies below the step: a ray passes all that begins there, wherever its samples fall. */
+TEST(values_from_a_step_on_have_all_that_begins_there) {
+    for (int k = 0; k < 12; k++) {
+        field f = field_new(33, 9, 9);
+        test_random r = {(uint64_t)k + 1};
+        const double least = k < 6 ? 100 + 17 * k : 1.3 * k;
+        const isogi_transfer_point p[] = {{0, {1, 1, 1}, 0}, {least, {1, 1, 1}, 0.001f}, {least, {1, 1, 1}, 0.05f}, {250, {1, 1, 1}, 0.05f},
+                                          {251, {1, 1, 1}, 0}};
+        const isogi_transfer transfer = {p, 5, NULL, 0};
+        for (size_t i = 0; i < field_count(&f); i++)
+            f.value[i] = least + (k % 3 == 0 ? (double)(random_bits(&r) % 2) : k % 3 == 1 ? 0.2 * (double)(i % 2) : random_unit(&r));
+        f.value[0] = 0, f.value[1] = 255; /* in a corner: classes of all values between */
+        field_build(&f);
+        for (int path = 1; path <= 4; path++) {
+            const isogi_context context = {.threads = 1, .force_path = path};
+            const isogi_dvr_desc desc = {.pyramid = f.pyramid, .opaque = 1};
+            isogi_dvr *dvr = dvr_new_with(&desc, &transfer, &context);
+            for (int i = 0; i < 20; i++) {
+                const double y = 2 + 0.3 * i, eye[3] = {-40, y, 4.3}, target[3] = {60, y, 4.3};
+                const double opacity = -expm1(-32 * 0.05);
+                const pixel seen = cast(dvr, eye, target, NULL);
+                CHECK(fabs((double)seen.c[3] - opacity) < 1e-3, "field %d, path %d, ray %d: %g of %g", k, path, i, (double)seen.c[3],
+                      opacity);
+            }
+            isogi_dvr_free(dvr);
+        }
+        field_free(&f);
+    }
+}
+
 /* The shadows of labels: matter of one label all around, others in two corners of the box. */
 TEST(labels_at_steps_cast_shadows) {
     for (int labels = 2; labels < 9; labels++) {

@@ -2048,6 +2048,85 @@ TEST(drafts_of_any_colour_have_errors) {
     scene_free(&s);
 }
 
+/* What was asked for is loaded while it is at work, at any place of it; what is asked for then is lit as in a texture that had all of it
+   before, whatever memory held. */
+static int memory_holds;
+static void *held_alloc(void *user, size_t size, size_t align) {
+    void *p = malloc(size);
+    (void)user, (void)align; /* at most that of malloc here */
+    return p ? memset(p, memory_holds, size) : p;
+}
+static void held_release(void *user, void *p, size_t size) { (void)user, (void)size, free(p); }
+TEST(requests_after_a_block_that_came_in_the_middle_of_work) {
+    enum { POINTS = 300 };
+    scene s = scene_make(16, 16, 16, NULL, ripples, NULL);
+    static float points[2 * POINTS][3], e[POINTS][3], expected[POINTS][3], last[POINTS][3];
+    const float(*more)[3] = (const float(*)[3])points + POINTS;
+    const isogi_context context = {.threads = 1, .alloc = held_alloc, .release = held_release};
+    const int n = surface_points(&s, 0, 2 * POINTS, 3, points);
+    for (int bounces = -1; bounces < 1; bounces++) {
+        isogi_trace_desc d = feedback(&s, 0.9f, bounces, bounces ? 8 : 4);
+        isogi_trace *t = NULL;
+        size_t size;
+        uint8_t *block;
+        double left = 1, apart, sum = 0, worst = 0;
+        int differ = 0, steps = 0;
+        d.lazy = 1;
+        CHECK(n == 2 * POINTS && isogi_trace_create(&t, &d, &context) == ISOGI_OK, "create");
+        isogi_trace_request(t, (const float(*)[3])points, POINTS), isogi_trace_step(t, 0, NULL);
+        size = isogi_trace_save_size(t), block = (uint8_t *)malloc(size);
+        CHECK(isogi_trace_save(t, block, size) == ISOGI_OK, "save");
+        isogi_trace_request(t, more, POINTS), isogi_trace_step(t, 0, NULL);
+        isogi_trace_sample(t, more, POINTS, expected, NULL), isogi_trace_free(t);
+        for (int i = 0; i < POINTS; i++) sum += pow((double)expected[i][1], 2);
+        for (int before = 0; left > 0; before += 3)
+            for (memory_holds = 0; memory_holds < 0x100; memory_holds += 0x7f) {
+                if (memory_holds > 0x7f) break;
+                CHECK(isogi_trace_create(&t, &d, &context) == ISOGI_OK, "create");
+                isogi_trace_request(t, (const float(*)[3])points, POINTS);
+                for (left = 1, steps = 0; steps < before && left > 0; steps++) isogi_trace_step(t, bounces ? 1000 : 100, &left);
+                CHECK(isogi_trace_load(t, block, size) == ISOGI_OK, "load");
+                isogi_trace_request(t, more, POINTS), isogi_trace_step(t, 0, NULL);
+                isogi_trace_sample(t, more, POINTS, e, NULL), isogi_trace_free(t);
+                for (int i = apart = 0; i < POINTS; i++) apart += pow((double)e[i][1] - (double)expected[i][1], 2);
+                if (!(apart <= worst)) worst = apart;
+                if (memory_holds) differ += memcmp(e, last, sizeof e) != 0;
+                memcpy(last, e, sizeof e);
+            }
+        CHECK(steps > 20 && !differ, "%d reflections, %d steps: %d by what memory held", bounces, steps, differ);
+        CHECK(sqrt(worst / sum) < 0.08, "%d reflections: up to %g apart", bounces, sqrt(worst / sum));
+        printf("    %d reflections: %d steps, up to %.3g apart\n", bounces, steps, sqrt(worst / sum));
+        free(block);
+    }
+    scene_free(&s);
+}
+
+/* Where light fades so slowly that it is worked out at once, request after request: the same bits in slices. */
+TEST(requests_of_slow_light_are_the_same_bits_in_slices) {
+    enum { POINTS = 240, PARTS = 4 };
+    double q[5] = {8, 8, 8, 5.2, 30};
+    scene s = scene_make(17, 17, 17, NULL, shell, q);
+    static float points[POINTS][3], e[2][POINTS][3];
+    const int n = surface_points(&s, 0, POINTS, 3, points);
+    for (int samples = 5; samples < 7; samples++) {
+        isogi_trace_desc d = feedback(&s, 0.995f, -1, samples);
+        const isogi_albedo_point glow = {0, {1, 1, 1}};
+        d.lazy = 1, d.isovalue_min = -0.2, d.isovalue_max = 0.2, d.emission_points = &glow, d.emission_count = 1;
+        for (int sliced = 0; sliced < 2; sliced++) {
+            isogi_trace *t = NULL;
+            CHECK(isogi_trace_create(&t, &d, NULL) == ISOGI_OK, "create");
+            for (int part = 0; part < PARTS; part++) {
+                double left = 1;
+                isogi_trace_request(t, (const float(*)[3])points + n * part / PARTS, (size_t)(n / PARTS));
+                while (left > 0 && isogi_trace_step(t, sliced ? 100 : 0, &left) == ISOGI_OK) {}
+            }
+            isogi_trace_sample(t, (const float(*)[3])points, (size_t)n, e[sliced], NULL), isogi_trace_free(t);
+        }
+        CHECK(n == POINTS && !memcmp(e[0], e[1], sizeof e[0]), "%d samples: other light in slices", samples);
+    }
+    scene_free(&s);
+}
+
 /* A walk through a lazy texture: each request costs what it brings, however much was asked for before; light is that of one request for
    all, to the bit where none is reflected. */
 static int by_x(const void *a, const void *b) {
