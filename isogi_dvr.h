@@ -5810,7 +5810,7 @@ static double isogi_dvr__span_factor(isogi_dvr__span *s) {
 /* Light is looked up once for a piece, at its middle. */
 static void isogi_dvr__span_light(const isogi_dvr__pixel_ray *r, isogi_dvr__span *s, double opacity) {
     const isogi_dvr__stretch *p = &s->piece;
-    double local[3], t = p->t0 + 0.5 * (p->u0 + p->u1) * p->dt, dark[3] = {0, 0, 0};
+    double local[3], t = p->t0 + 0.5 * (p->u0 + p->u1) * p->dt;
     int side = p->value[1] > p->value[0] ? 1 : p->value[1] < p->value[0] ? -1 : 0, cell[3], a;
     for (a = 0; a < 3; a++) s->light[a] = 1, s->add[a] = 0;
     s->lit = 1;
@@ -5818,10 +5818,8 @@ static void isogi_dvr__span_light(const isogi_dvr__pixel_ray *r, isogi_dvr__span
     isogi_dvr__span_place(s, 0.5 * (p->u0 + p->u1), local);
     memcpy(cell, p->cell, sizeof cell);
     if (s->sampled) isogi_dvr__locate(s->walk.m, t, cell, local);
-    isogi_dvr__shade(r, cell, local, side, opacity, s->light);
-    if (r->dvr->desc.shading != ISOGI_DVR_TWO_SIDED) return;
-    isogi_dvr__shade(r, cell, local, side, opacity, dark);
-    for (a = 0; a < 3; a++) s->add[a] = dark[a], s->light[a] -= dark[a];
+    if (r->dvr->desc.shading != ISOGI_DVR_TWO_SIDED) isogi_dvr__shade(r, cell, local, side, opacity, s->light);
+    else isogi_dvr__shade_two_sided(r->dvr, r->lights, cell, local, r->dir, side, opacity, s->light, s->add);
 }
 
 /* Where within the part from value x to y the transmittance passes the probe's end. */
@@ -8358,8 +8356,13 @@ static uint32_t isogi_dvr__next_border(isogi_dvr__tet_ray *r, double last_t, uin
     while (top) {
         const isogi_dvr__node *n = &m->node[stack[--top]];
         if (!isogi_dvr__hits_box(r, n, last_t, nearest)) continue;
-        if (!n->count) {
-            stack[top++] = n->first, stack[top++] = n->first + 1;
+        if (!n->count) { /* the nearer child first: what it holds leaves less of the other to look at */
+            const isogi_dvr__node *child = &m->node[n->first];
+            double ahead = 0;
+            for (i = 0; i < 3; i++)
+                ahead += (((double)child[0].low[i] + (double)child[0].high[i]) - ((double)child[1].low[i] + (double)child[1].high[i])) *
+                         r->dir[i];
+            stack[top++] = n->first + (ahead > 0 ? 0 : 1), stack[top++] = n->first + (ahead > 0 ? 1 : 0);
             continue;
         }
         for (i = n->first; i < n->first + n->count; i++) {

@@ -6969,6 +6969,23 @@ static int isogi_trace__export_around(const isogi_trace__export *e, const size_t
     return total > 0;
 }
 
+#define ISOGI_TRACE__APART 16
+/* Whether the texels from `at` on, ISOGI_TRACE__APART along x, have nothing filled among them and their neighbours. */
+static int isogi_trace__export_alone(const isogi_trace__export *e, const size_t at[3]) {
+    static const uint8_t none[ISOGI_TRACE__APART + 2] = {0};
+    const size_t *size = e->trace->lattice;
+    size_t low[3], end[3], y, z;
+    int a;
+    for (a = 0; a < 3; a++) {
+        low[a] = at[a] ? at[a] - 1 : 0, end[a] = at[a] + (a ? 2 : ISOGI_TRACE__APART + 1);
+        end[a] = end[a] < size[a] ? end[a] : size[a];
+    }
+    for (z = low[2]; z < end[2]; z++)
+        for (y = low[1]; y < end[1]; y++)
+            if (memcmp(e->filled + low[0] + size[0] * (y + size[1] * z), none, end[0] - low[0])) return 0;
+    return 1;
+}
+
 /* Three passes outwards, then the mean of all. */
 static void isogi_trace__export_fill(isogi_trace__export *e) {
     const size_t *size = e->trace->lattice;
@@ -6976,17 +6993,24 @@ static void isogi_trace__export_fill(isogi_trace__export *e) {
     size_t at[3], texel, computed = 0;
     int pass, v;
     for (texel = 0; texel < e->texels; texel++) computed += e->filled[texel];
-    for (pass = 1; pass <= 4; pass++)
-        for (texel = 0; texel < e->texels; texel++) {
-            if (e->filled[texel]) continue;
-            at[0] = texel % size[0], at[1] = texel / size[0] % size[1], at[2] = texel / size[0] / size[1];
-            if (pass == 4)
-                for (v = 0; v < e->values; v++) values[v] = computed ? (float)(e->mean[v] / (double)computed) : 0;
-            else if (!isogi_trace__export_around(e, at, pass, values)) continue;
-            isogi_trace__export_write(e, texel, values);
-            e->filled[texel] = (uint8_t)(pass + 1);
-        }
+    for (pass = 1; pass <= 3 && computed; pass++)
+        for (texel = 0, at[2] = 0; at[2] < size[2]; at[2]++)
+            for (at[1] = 0; at[1] < size[1]; at[1]++)
+                for (at[0] = 0; at[0] < size[0]; at[0]++, texel++) {
+                    if (at[0] % ISOGI_TRACE__APART == 0 && isogi_trace__export_alone(e, at)) {
+                        v = ISOGI_TRACE__APART - 1, texel += (size_t)v, at[0] += (size_t)v;
+                        if (at[0] >= size[0]) texel -= at[0] - (size[0] - 1);
+                        continue;
+                    }
+                    if (e->filled[texel] || !isogi_trace__export_around(e, at, pass, values)) continue;
+                    isogi_trace__export_write(e, texel, values);
+                    e->filled[texel] = (uint8_t)(pass + 1);
+                }
+    for (v = 0; v < e->values; v++) values[v] = computed ? (float)(e->mean[v] / (double)computed) : 0;
+    for (texel = 0; texel < e->texels; texel++)
+        if (!e->filled[texel]) isogi_trace__export_write(e, texel, values);
 }
+#undef ISOGI_TRACE__APART
 
 ISOGI_API size_t isogi_trace_export_size(const isogi_trace *trace, int format) {
     isogi_trace__export e;
