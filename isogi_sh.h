@@ -60,9 +60,9 @@
    Memory       None allocated. Stack use stays below 32 KB (below 60 where the compiler does not optimise).
    Threads      Every function is pure: call them from any thread.
    Speed        Batches of 16 directions and more (8 of doubles) use all lanes of AVX2 and AVX-512, whatever the count; a direction alone
-                takes five times its share of a batch up to order 5, eight times beyond. Results that stay in the first-level cache, such
-                as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of 4096
-                bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
+                takes up to five times its share of a batch up to order 5, eight times beyond. Results that stay in the first-level cache,
+                such as 64 directions at order 11, take half or a third of the time; rows of a structure of arrays that are a multiple of
+                4096 bytes long take twice as long again, since all functions of a direction compete for the same lines of the cache.
    Determinism  The same input on the same instruction path gives the same bits. Paths agree within the float errors below.
    Accuracy     Largest absolute error against 128 bits, poles and all: double 1e-15 at degree 4, 5e-15 at 10, 2e-14 at 20, 1.5e-13 at 50,
                 7e-13 at 100 (all near poles, some .01 to .1 off them, for m = 0 and +-1; up to twice as much in x87 registers, as on
@@ -2698,7 +2698,7 @@ ISOGI_API isogi_result isogi_sh_eval_soa_f64(double *basis, int order, const dou
 
 /* ==== gradients ====================================================================================================== */
 
-static void isogi_sh__put_gradient(void *out, int is_double, size_t at, isogi_sh__unit u, double x, double y, double z) {
+ISOGI_SH__INLINE void isogi_sh__put_gradient(void *out, int is_double, size_t at, isogi_sh__unit u, double x, double y, double z) {
     double radial = x * u.x + y * u.y + z * u.z;
     x -= radial * u.x, y -= radial * u.y, z -= radial * u.z;
     if (is_double) {
@@ -2710,26 +2710,59 @@ static void isogi_sh__put_gradient(void *out, int is_double, size_t at, isogi_sh
     }
 }
 
+/* Terms +-m of degree l, from q_l^m and dq_l^m, m-th powers of x + i y and those before */
+ISOGI_SH__INLINE void isogi_sh__put_gradients(void *out, int is_double, size_t centre, int m, isogi_sh__unit u, double mq, double dq,
+                                              const double now[2], const double before[2]) {
+    size_t away = (size_t)m;
+    isogi_sh__put_gradient(out, is_double, centre + away, u, mq * before[0], -mq * before[1], dq * now[0]);
+    if (m) isogi_sh__put_gradient(out, is_double, centre - away, u, mq * before[1], mq * before[0], dq * now[1]);
+}
+
 /* q(z) c_m(x, y) is a polynomial, whose gradient loses its radial part: dq_l^m / dz = sqrt((l-m)(l+m+1)) q_l^{m+1}, and the
    derivatives of (x + i y)^m are m (x + i y)^{m-1} (1, i). Nothing is singular at the poles. */
-static void isogi_sh__gradient(void *out, int is_double, size_t first, int order, isogi_sh__unit u) {
-    double column[2][ISOGI_SH_MAX_ORDER + 1], cm = 1, sm = 0, c_before = 0, s_before = 0, diagonal = isogi_sh__next_diagonal(0, 0), t;
+ISOGI_SH__INLINE void isogi_sh__gradient(void *out, int is_double, size_t first, int order, isogi_sh__unit u) {
+    double column[2][ISOGI_SH_MAX_ORDER + 1], power[2][2] = {{1, 0}, {1, 0}}, diagonal = isogi_sh__next_diagonal(0, 0);
     int l, m;
     isogi_sh__column(column[0], order, 0, diagonal, u.z, u.z_low);
     for (m = 0; m < order; m++) {
-        const double *q = column[m & 1], *next = column[(m + 1) & 1];
+        const double *q = column[m & 1], *next = column[(m + 1) & 1], *now = power[m & 1];
+        double *other = power[(m + 1) & 1];
         diagonal = isogi_sh__next_diagonal(diagonal, m + 1);
         if (m + 1 < order) isogi_sh__column(column[(m + 1) & 1], order, m + 1, diagonal, u.z, u.z_low);
         for (l = m; l < order; l++) {
-            double dq = l > m ? sqrt((double)((l - m) * (l + m + 1)) * (m ? 1 : 0.5)) * next[l] : 0, mq = (double)m * q[l];
-            size_t at = first + (size_t)(l * (l + 1) + m);
-            isogi_sh__put_gradient(out, is_double, at, u, mq * c_before, -mq * s_before, dq * cm);
-            if (m) isogi_sh__put_gradient(out, is_double, at - 2 * (size_t)m, u, mq * s_before, mq * c_before, dq * sm);
+            double dq = l > m ? sqrt((double)((l - m) * (l + m + 1)) * (m ? 1 : 0.5)) * next[l] : 0;
+            isogi_sh__put_gradients(out, is_double, first + (size_t)(l * (l + 1)), m, u, (double)m * q[l], dq, now, other);
         }
-        c_before = cm, s_before = sm;
-        t = u.x * cm - u.y * sm;
-        sm = u.x * sm + u.y * cm;
-        cm = t;
+        other[0] = u.x * now[0] - u.y * now[1], other[1] = u.x * now[1] + u.y * now[0];
+    }
+}
+
+/* The same degree by degree for low orders, where all roots are constants; recursions as in isogi_sh__eval_low. */
+ISOGI_SH__INLINE void isogi_sh__gradient_low(void *out, int is_double, size_t first, int order, isogi_sh__unit u) {
+    const double *table = isogi_sh__table_f64;
+    double q[ISOGI_SH__UNROLLED_ORDER], before[ISOGI_SH__UNROLLED_ORDER], power[ISOGI_SH__UNROLLED_ORDER][2];
+    double p = 1, difference = 0, sign = u.z < 0 ? -1 : 1, t = u.z < 0 ? (1 + u.z) + u.z_low : (1 - u.z) - u.z_low;
+    int l, m;
+    power[0][0] = 1, power[0][1] = 0;
+    isogi_sh__put_gradients(out, is_double, first, 0, u, 0, 0, power[0], power[0]);
+    ISOGI_SH__UNROLL
+    for (l = 1; l < ISOGI_SH__UNROLLED_ORDER; l++) {
+        if (l >= order) return;
+        difference = table[3 * l] * difference + table[3 * l + 1] * t * p;
+        p += difference;
+        q[0] = table[3 * l + 2] * (l & 1 ? sign * p : p);
+        power[l][0] = u.x * power[l - 1][0] - u.y * power[l - 1][1], power[l][1] = u.x * power[l - 1][1] + u.y * power[l - 1][0];
+        ISOGI_SH__UNROLL
+        for (m = 1; m <= l; m++) {
+            const double *pair = table + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m) + 2 * (l - m) - 1;
+            double last = m < l ? q[m] : 0;
+            q[m] = m < l ? pair[0] * (u.z * last + u.z_low * last) + pair[1] * before[m] : pair[1];
+            before[m] = last;
+        }
+        ISOGI_SH__UNROLL
+        for (m = 0; m <= l; m++)
+            isogi_sh__put_gradients(out, is_double, first + (size_t)(l * (l + 1)), m, u, m * q[m],
+                                    m < l ? sqrt((l - m) * (l + m + 1) * (m ? 1 : 0.5)) * q[m + 1] : 0, power[m], power[m ? m - 1 : 0]);
     }
 }
 
@@ -2739,8 +2772,9 @@ ISOGI_API isogi_result isogi_sh_eval_gradient(float (*gradient)[3], int order, c
     if (!isogi_sh__fits(count, order, sizeof *gradient)) return ISOGI_TOO_LARGE;
     for (i = 0; i < count; i++) {
         const float *d = direction[i];
-        isogi_sh__gradient(gradient, 0, i * ISOGI_SH_COUNT(order), order,
-                           isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]));
+        size_t first = i * ISOGI_SH_COUNT(order);
+        if (order <= ISOGI_SH__UNROLLED_ORDER) isogi_sh__gradient_low(gradient, 0, first, order, isogi_sh__normalise_f32(d));
+        else isogi_sh__gradient(gradient, 0, first, order, isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]));
     }
     return ISOGI_OK;
 }
@@ -2749,9 +2783,11 @@ ISOGI_API isogi_result isogi_sh_eval_gradient_f64(double (*gradient)[3], int ord
     size_t i;
     if (!isogi_sh__order_ok(order) || (count && (!gradient || !direction))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *gradient)) return ISOGI_TOO_LARGE;
-    for (i = 0; i < count; i++)
-        isogi_sh__gradient(gradient, 1, i * ISOGI_SH_COUNT(order), order,
-                           isogi_sh__normalise(direction[i][0], direction[i][1], direction[i][2]));
+    for (i = 0; i < count; i++) {
+        isogi_sh__unit u = isogi_sh__normalise(direction[i][0], direction[i][1], direction[i][2]);
+        if (order <= ISOGI_SH__UNROLLED_ORDER) isogi_sh__gradient_low(gradient, 1, i * ISOGI_SH_COUNT(order), order, u);
+        else isogi_sh__gradient(gradient, 1, i * ISOGI_SH_COUNT(order), order, u);
+    }
     return ISOGI_OK;
 }
 
@@ -3954,12 +3990,62 @@ ISOGI_SH__AVX2 static isogi_result isogi_sh__apply_order5(float *out, const floa
 #undef ISOGI_SH__COLUMN
 #undef ISOGI_SH__OF_FOUR
 #undef ISOGI_SH__FOUR
+
+/* `rows` rows of a band, 1 .. 8 or (2 halves) 9 .. 16, for `some` of its channels: columns times numbers, less what is past the rows. */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__apply_rows(float *out, const float *in, const float *rotation, int width, int rows,
+                                                          int channels, int some, int halves) {
+    static const int32_t keep[24] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+    const __m256i last = _mm256_loadu_si256((const __m256i *)(const void *)(keep + 8 + 8 * halves - rows));
+    isogi_sh__f8 zero = {0}, a[3] = {zero, zero, zero}, b[3] = {zero, zero, zero};
+    float sum[3][16];
+    int i, j, k;
+    for (j = 0; j < width; j++, rotation += width, in += channels) {
+        isogi_sh__f8 high = (isogi_sh__f8)_mm256_maskload_ps(rotation + 8 * (halves - 1), last), low = high;
+        if (halves > 1) low = (isogi_sh__f8)_mm256_loadu_ps(rotation);
+        ISOGI_SH__UNROLL
+        for (k = 0; k < some; k++) {
+            isogi_sh__f8 x = ISOGI_SH__FROM_F8(in + k);
+            a[k] = ISOGI_SH__FMA_F8(low, x, a[k]);
+            if (halves > 1) b[k] = ISOGI_SH__FMA_F8(high, x, b[k]);
+        }
+    }
+    ISOGI_SH__UNROLL
+    for (k = 0; k < some; k++) {
+        *(isogi_sh__f8 *)sum[k] = a[k];
+        if (halves > 1) *(isogi_sh__f8 *)(sum[k] + 8) = b[k];
+    }
+    for (i = 0; i < rows; i++, out += channels) {
+        ISOGI_SH__UNROLL
+        for (k = 0; k < some; k++) out[k] = sum[k][i];
+    }
+}
+
+ISOGI_SH__AVX2 static void isogi_sh__apply_band(float *out, const float *in, const float *rotation, int width, int channels) {
+    int first, k, rows;
+    for (first = 0; first < width; first += rows) {
+        rows = width - first < 16 ? width - first : 16;
+        for (k = 0; k < channels;) {
+            float *to = out + channels * first + k;
+            if (channels - k < 3 && rows > 8) isogi_sh__apply_rows(to, in + k, rotation + first, width, rows, channels, 1, 2), k++;
+            else if (channels - k < 3) isogi_sh__apply_rows(to, in + k, rotation + first, width, rows, channels, 1, 1), k++;
+            else if (rows > 8) isogi_sh__apply_rows(to, in + k, rotation + first, width, rows, channels, 3, 2), k += 3;
+            else isogi_sh__apply_rows(to, in + k, rotation + first, width, rows, channels, 3, 1), k += 3;
+        }
+    }
+}
 #endif
 
 /* Kept out of the caller, whose fast way would pay for its registers. */
 ISOGI_SH__APART isogi_result isogi_sh__rotation_apply(float *out, const float *in, int order, int channels, const float *rotation) {
     int l, i, j, k;
     if (!out || !in || !rotation || !isogi_sh__shape_ok(order, channels)) return ISOGI_INVALID;
+#ifdef ISOGI_SH__SIMD
+    if (isogi_sh__avx2()) {
+        for (l = 0; l < order; rotation += (2 * l + 1) * (2 * l + 1), l++)
+            isogi_sh__apply_band(out + channels * l * l, in + channels * l * l, rotation, 2 * l + 1, channels);
+        return ISOGI_OK;
+    }
+#endif
     for (l = 0; l < order; l++) {
         int width = 2 * l + 1, base = channels * l * l;
         for (i = 0; i < width * channels; i++) out[base + i] = 0;
@@ -4395,17 +4481,26 @@ static void isogi_sh__product(float *out, const float *f, const float *g, int or
         }
 }
 
+/* Orders 1 and 2: what two linear functions make of degree 2 is left out. */
+static void isogi_sh__product_linear(float *out, const float *f, const float *g, int n) {
+    double sum = 0, f0 = 0.28209479177387814347 * (double)f[0], g0 = 0.28209479177387814347 * (double)g[0];
+    int i;
+    for (i = 0; i < n; i++) sum += (double)f[i] * (double)g[i];
+    for (i = 1; i < n; i++) out[i] = (float)(f0 * (double)g[i] + (double)f[i] * g0);
+    out[0] = (float)(0.28209479177387814347 * sum);
+}
+
 #ifdef ISOGI_SH__SIMD
-/* Order 5 with the 7 latitudes that its products need as lanes: expansions into Fourier series, their product, and back. */
-ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 *s, const float *f) {
+/* Orders 3 to 5 with the 7 latitudes that products of order 5 need as lanes: expansions into Fourier series, their product, and back. */
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 *s, const float *f, int order) {
     const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32;
     isogi_sh__f8 zero = {0};
     int l, m;
     ISOGI_SH__UNROLL
-    for (m = 0; m < 5; m++) {
+    for (m = 0; m < order; m++, q += 5 - order) {
         isogi_sh__f8 a = zero, b = zero;
         ISOGI_SH__UNROLL
-        for (l = m; l < 5; l++, q++) {
+        for (l = m; l < order; l++, q++) {
             a = ISOGI_SH__ADD_F8(*q, f[l * (l + 1) + m], a);
             if (m) b = ISOGI_SH__ADD_F8(*q, f[l * (l + 1) - m], b);
         }
@@ -4414,21 +4509,21 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
 }
 
 /* c and s, twice the terms of the product of two Fourier series, from ac, as, bc, bs; the table for the way back halves them. */
-#define ISOGI_SH__FOURIER(V, FMA)                                                                                              \
+#define ISOGI_SH__FOURIER(V, FMA, ORDER)                                                                                       \
     a0 = ac[0] + ac[0], b0 = bc[0] + bc[0], c[0] = a0 * bc[0];                                                                 \
     ISOGI_SH__UNROLL                                                                                                           \
-    for (i = 1; i < 5; i++) c[0] = FMA(ac[i], bc[i], FMA(as[i], bs[i], c[0]));                                                 \
+    for (i = 1; i < ORDER; i++) c[0] = FMA(ac[i], bc[i], FMA(as[i], bs[i], c[0]));                                             \
     ISOGI_SH__UNROLL                                                                                                           \
-    for (m = 1; m < 5; m++) {                                                                                                  \
+    for (m = 1; m < ORDER; m++) {                                                                                              \
         V cosine = zero, sine = zero;                                                                                          \
         ISOGI_SH__UNROLL                                                                                                       \
-        for (i = 1; i < 5; i++) { /* what is taken away */                                                                     \
+        for (i = 1; i < ORDER; i++) { /* what is taken away */                                                                 \
             if (i < m) cosine = FMA(as[i], bs[m - i], cosine);                                                                 \
             if (i > m) sine = FMA(ac[i], bs[i - m], FMA(as[i - m], bc[i], sine));                                              \
         }                                                                                                                      \
         cosine = FMA(a0, bc[m], FMA(ac[m], b0, -cosine)), sine = FMA(a0, bs[m], FMA(as[m], b0, -sine));                        \
         ISOGI_SH__UNROLL                                                                                                       \
-        for (i = 1; i < 5; i++) {                                                                                              \
+        for (i = 1; i < ORDER; i++) {                                                                                          \
             if (i < m) cosine = FMA(ac[i], bc[m - i], cosine), sine = FMA(as[i], bc[m - i], FMA(ac[i], bs[m - i], sine));      \
             if (i <= m) continue;                                                                                              \
             cosine = FMA(ac[i], bc[i - m], FMA(as[i], bs[i - m], cosine)), sine = FMA(as[i], bc[i - m], sine);                 \
@@ -4437,27 +4532,37 @@ ISOGI_SH__AVX2 static void isogi_sh__latitudes_f8(isogi_sh__f8 *c, isogi_sh__f8 
         c[m] = cosine, s[m] = sine;                                                                                            \
     }
 
-ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, const float *g) {
+ISOGI_SH__AVX2 ISOGI_SH__INLINE void isogi_sh__product_f8(float *out, const float *f, const float *g, int order) {
     isogi_sh__f8 ac[5], as[5], bc[5], bs[5], a0, b0, c[5], s[5], zero = {0}, scratch[25], turned[8];
-    const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32 + 15;
+    const isogi_sh__f8 *q = (const isogi_sh__f8 *)isogi_sh__latitudes_f32 + 15, *last = scratch + order * order - 1;
     int i, l, m;
-    isogi_sh__latitudes_f8(ac, as, f);
-    isogi_sh__latitudes_f8(bc, bs, g);
-    ISOGI_SH__FOURIER(isogi_sh__f8, ISOGI_SH__FMA_F8)
+    isogi_sh__latitudes_f8(ac, as, f, order);
+    isogi_sh__latitudes_f8(bc, bs, g, order);
+    ISOGI_SH__FOURIER(isogi_sh__f8, ISOGI_SH__FMA_F8, order)
     ISOGI_SH__UNROLL
-    for (m = 0; m < 5; m++) {
+    for (m = 0; m < order; m++, q += 5 - order) {
         ISOGI_SH__UNROLL
-        for (l = m; l < 5; l++, q++) {
+        for (l = m; l < order; l++, q++) {
             scratch[l * (l + 1) + m] = *q * c[m];
             if (m) scratch[l * (l + 1) - m] = *q * s[m];
         }
     }
-    for (i = 0; i < 24; i += 8) {
+    for (i = 0; i + 8 <= order * order; i += 8) {
         isogi_sh__transpose_f8((float *)turned, 8, scratch + i, 1);
         *(isogi_sh__f8 *)(out + i) = ((turned[0] + turned[1]) + (turned[2] + turned[3])) + ((turned[4] + turned[5]) + turned[6]);
     }
-    out[24] =
-        ((scratch[24][0] + scratch[24][1]) + (scratch[24][2] + scratch[24][3])) + ((scratch[24][4] + scratch[24][5]) + scratch[24][6]);
+    if (order != 4)
+        out[i] = (((*last)[0] + (*last)[1]) + ((*last)[2] + (*last)[3])) + (((*last)[4] + (*last)[5]) + (*last)[6]);
+}
+
+ISOGI_SH__AVX2 static void isogi_sh__product_order3(float *out, const float *f, const float *g) { isogi_sh__product_f8(out, f, g, 3); }
+ISOGI_SH__AVX2 static void isogi_sh__product_order4(float *out, const float *f, const float *g) { isogi_sh__product_f8(out, f, g, 4); }
+ISOGI_SH__AVX2 static void isogi_sh__product_order5(float *out, const float *f, const float *g) { isogi_sh__product_f8(out, f, g, 5); }
+
+static void isogi_sh__product_low_f8(float *out, const float *f, const float *g, int order) {
+    if (order == 3) isogi_sh__product_order3(out, f, g);
+    else if (order == 4) isogi_sh__product_order4(out, f, g);
+    else isogi_sh__product_order5(out, f, g);
 }
 
 /* Sixteen products of order 5 with one in each lane. Latitudes z and -z share the parts of a series that are even and odd in z:
@@ -4688,10 +4793,15 @@ ISOGI_API isogi_result isogi_sh_product(float *out, const float *a, const float 
     if (!isogi_sh__order_ok(order) || (count && (!out || !a || !b))) return ISOGI_INVALID;
     if (!isogi_sh__fits(count, order, sizeof *out)) return ISOGI_TOO_LARGE;
     n = ISOGI_SH_COUNT(order);
+    if (order <= 2) {
+        for (i = 0; i < count; i++) isogi_sh__product_linear(out + n * i, a + n * i, b + n * i, (int)n);
+        return ISOGI_OK;
+    }
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && isogi_sh__level()) {
-        for (i = 0; i + 16 <= count && isogi_sh__level() > 1; i += 16) isogi_sh__product_order5_f16(out + n * i, a + n * i, b + n * i);
-        for (; i < count; i++) isogi_sh__product_order5(out + n * i, a + n * i, b + n * i);
+    if (order <= 5 && isogi_sh__level()) {
+        for (i = 0; order == 5 && i + 16 <= count && isogi_sh__level() > 1; i += 16)
+            isogi_sh__product_order5_f16(out + n * i, a + n * i, b + n * i);
+        for (; i < count; i++) isogi_sh__product_low_f8(out + n * i, a + n * i, b + n * i, order);
         return ISOGI_OK;
     }
     if (order <= ISOGI_SH__SIDE && isogi_sh__level()) {
@@ -4821,13 +4931,13 @@ ISOGI_API isogi_result isogi_sh_product_matrix(float *matrix, const float *f, in
     if (!matrix || !f || !isogi_sh__order_ok(order)) return ISOGI_INVALID;
     if (!isogi_sh__fits(ISOGI_SH_COUNT(order), order, sizeof *matrix)) return ISOGI_TOO_LARGE;
 #ifdef ISOGI_SH__SIMD
-    if (order == 5 && isogi_sh__level()) { /* products of f and unit vectors take less */
-        int i, j;
-        for (i = 0; i < 25; i++) {
+    if (order >= 3 && order <= 5 && isogi_sh__level()) { /* products of f and unit vectors take less */
+        int i, j, n = order * order;
+        for (i = 0; i < n; i++) {
             float unit[25] = {0};
             unit[i] = 1;
-            isogi_sh__product_order5(matrix + 25 * i, f, unit);
-            for (j = 0; j < i; j++) matrix[25 * i + j] = matrix[25 * j + i]; /* rounding would make them differ */
+            isogi_sh__product_low_f8(matrix + n * i, f, unit, order);
+            for (j = 0; j < i; j++) matrix[n * i + j] = matrix[n * j + i]; /* rounding would make them differ */
         }
         return ISOGI_OK;
     }
@@ -6203,6 +6313,13 @@ static void isogi_sh__add_light(float *c, int order, const isogi_light *light, c
     isogi_sh__add_rgb_lobe(c, order, scale, isogi_sh__normalise(d[0], d[1], d[2]), rgb);
 }
 
+static int isogi_sh__identity(const double m[9]) {
+    int i;
+    for (i = 0; i < 9; i++)
+        if (m[i] < (i % 4 ? 0 : 1) || m[i] > (i % 4 ? 0 : 1)) return 0;
+    return 1;
+}
+
 /* The environment's image and coefficients, in a unit, and turned. */
 static void isogi_sh__add_env(float *rgb, int order, const isogi_env *env, double unit) {
     isogi_sh__euler e;
@@ -6211,7 +6328,8 @@ static void isogi_sh__add_env(float *rgb, int order, const isogi_env *env, doubl
     if (env->rgb) isogi_sh__image(rgb, order, 3, env->rgb, env->width, env->height, unit);
     for (i = 0; i < n && !env->rgb; i++) rgb[i] = 0;
     for (i = 0; i < given; i++) rgb[i] += (float)unit * env->sh[i];
-    if ((env->rgb || env->sh) && isogi_sh__env_rotation(m, env) == ISOGI_OK && isogi_sh__euler_angles(&e, m) == ISOGI_OK)
+    if ((env->rgb || env->sh) && isogi_sh__env_rotation(m, env) == ISOGI_OK && !isogi_sh__identity(m) &&
+        isogi_sh__euler_angles(&e, m) == ISOGI_OK)
         isogi_sh__rotate(rgb, rgb, 0, order, 3, &e);
 }
 

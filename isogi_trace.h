@@ -2443,13 +2443,37 @@ static void isogi_trace__record_write(const isogi_trace *t, uint8_t *record, con
     }
 }
 
+#if defined(ISOGI_TRACE__VECTORS) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+/* Four numbers as isogi_half_to_float reads them, lower byte first, times a unit */
+static inline void isogi_trace__four_halves(float *values, const uint8_t *from, float unit) {
+    typedef uint32_t four __attribute__((vector_size(16)));
+    typedef int32_t signs __attribute__((vector_size(16)));
+    typedef float floats __attribute__((vector_size(16)));
+    typedef uint16_t shorts __attribute__((vector_size(8)));
+    shorts raw;
+    four half, rest, small;
+    floats x;
+    memcpy(&raw, from, sizeof raw);
+    half = __builtin_convertvector(raw, four);
+    rest = half & 0x7fffu;
+    small = (four)((signs)rest < 0x400);
+    x = __builtin_convertvector((signs)rest, floats) * (1.0f / 16777216); /* 2^-24 */
+    x = unit * (floats)((small & (four)x) | (~small & (rest * 0x2000u + 0x38000000u)) | (half & 0x8000u) << 16);
+    memcpy(values, &x, sizeof x);
+}
+#endif
+
 static void isogi_trace__record_read(const isogi_trace *t, const uint8_t *record, float *values) {
     const uint8_t *from = record + 2;
     float unit = (float)t->scene.unit, scale;
     int i;
     switch (t->format) {
     case ISOGI_TRACE_HALF:
-        for (i = 0; i < t->values; i++) values[i] = unit * isogi_half_to_float((uint16_t)(from[2 * i] | from[2 * i + 1] << 8));
+        i = 0;
+#if defined(ISOGI_TRACE__VECTORS) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+        for (; i + 4 <= t->values; i += 4) isogi_trace__four_halves(values + i, from + 2 * i, unit);
+#endif
+        for (; i < t->values; i++) values[i] = unit * isogi_half_to_float((uint16_t)(from[2 * i] | from[2 * i + 1] << 8));
         break;
     case ISOGI_TRACE_RGB9E5:
         isogi_trace__from_rgb9e5((uint32_t)isogi_trace__get(from, 4), values);
