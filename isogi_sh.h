@@ -2755,9 +2755,10 @@ ISOGI_SH__INLINE void isogi_sh__gradient_low(void *out, int is_double, size_t fi
         ISOGI_SH__UNROLL
         for (m = 1; m <= l; m++) {
             const double *pair = table + 3 * ISOGI_SH__TABLE_ORDER + (m - 1) * (2 * ISOGI_SH__TABLE_ORDER - 1 - m) + 2 * (l - m) - 1;
-            double last = m < l ? q[m] : 0;
-            q[m] = m < l ? pair[0] * (u.z * last + u.z_low * last) + pair[1] * before[m] : pair[1];
-            before[m] = last;
+            if (m < l) {
+                double last = q[m];
+                q[m] = pair[0] * (u.z * last + u.z_low * last) + pair[1] * before[m], before[m] = last;
+            } else q[m] = pair[1], before[m] = 0;
         }
         ISOGI_SH__UNROLL
         for (m = 0; m <= l; m++)
