@@ -3299,53 +3299,64 @@ static void isogi_dvr__begin_walk(isogi_dvr__walk *w, isogi_dvr__march *m) {
     isogi_dvr__walk_to(w);
 }
 
-/* Steps over the largest empty block around the cell: 1 if there is one. The cell it lands in follows from integers along the axis that
-   leads out, and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
-static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
+/* To where the ray leaves the block of level n around its cell. The cell it lands in follows from integers along the axis that leads out,
+   and lies within the block's reach along the others, so that rounding can neither turn the ray back nor lose it. */
+static void isogi_dvr__pass_block(isogi_dvr__walk *w, int n) {
+    const isogi_dvr__march *m = w->m;
+    const int *c = w->cell, *cells = m->dvr->cells, shift = 2 + 2 * n;
+    double leave = m->length;
+    int axis = -1, first[3], a;
+    w->m->work.blocks_skipped++;
+    for (a = 0; a < 3; a++) {
+        double exit;
+        first[a] = c[a] >> shift << shift;
+        if (!(fabs(m->dir[a]) > 1e-300)) continue;
+        exit = ((m->dir[a] > 0 ? first[a] + (1 << shift) : first[a]) - m->origin[a]) * w->inverse[a];
+        if (exit < leave) leave = exit, axis = a;
+    }
+    w->t = axis < 0 ? m->length : leave > w->t ? leave : w->t;
+    for (a = 0; a < 3 && axis >= 0; a++) {
+        double x = isogi_dvr__clamp(m->origin[a] + w->t * m->dir[a], cells[a]);
+        int last = first[a] + (1 << shift) - 1, to = (int)x;
+        last = last < cells[a] ? last : cells[a] - 1;
+        if (m->dir[a] > 0) to = to > c[a] ? to : c[a];
+        else to = to < c[a] ? to : c[a];
+        to = to < last ? to : last;
+        to = to > first[a] ? to : first[a];
+        if (a == axis) to = m->dir[a] > 0 ? first[a] + (1 << shift) : first[a] - 1;
+        if (to < 0 || (to >= cells[a] && to > 0)) w->t = m->length, axis = -1;
+        else w->cell[a] = to, w->at[a] = isogi_dvr__clamp(x - to, 1);
+    }
+}
+
+/* The largest empty block around the cell: its level, and the values in it; -1 if there is none. */
+static int isogi_dvr__empty_block(isogi_dvr__walk *w, double range[2]) {
     isogi_dvr__march *m = w->m;
     const isogi_dvr *d = m->dvr;
     const int *c = w->cell;
     int n, a;
-    if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return 0;
+    if (c[0] >> 2 == m->known[0] && c[1] >> 2 == m->known[1] && c[2] >> 2 == m->known[2]) return -1;
     m->work.blocks++;
     n = d->empty[0][isogi_dvr__block_at(d, 0, c)] - 1;
     if (n >= 0) {
-        const isogi_level *level = &d->level[n];
-        int shift = 2 + 2 * n, axis = -1, first[3];
-        double leave = m->length;
-        size_t block = isogi_dvr__block_at(d, n, c);
-        m->work.blocks_skipped++;
-        /* Where voxels have no value, a block may hold some of them, and what lies behind it need not be near to what lies before it. */
-        if (!w->whole) w->chained = 0;
-        else if (!isogi_dvr__is_quiet(&d->integral, (double)level->range[block][0], (double)level->range[block][1], w->quiet))
-            w->quiet[0] = (double)level->range[block][0], w->quiet[1] = (double)level->range[block][1]; /* of one value */
-        w->skipped = 1;
-        for (a = 0; a < 3; a++) {
-            double exit;
-            first[a] = c[a] >> shift << shift;
-            if (!(fabs(m->dir[a]) > 1e-300)) continue;
-            exit = ((m->dir[a] > 0 ? first[a] + (1 << shift) : first[a]) - m->origin[a]) * w->inverse[a];
-            if (exit < leave) leave = exit, axis = a;
-        }
-        w->t = leave > w->t ? leave : w->t;
-        if (axis < 0) return w->t = m->length, 1;
-        for (a = 0; a < 3; a++) {
-            double x = isogi_dvr__clamp(m->origin[a] + w->t * m->dir[a], d->cells[a]);
-            int last = first[a] + (1 << shift) - 1, to = (int)x;
-            last = last < d->cells[a] ? last : d->cells[a] - 1;
-            if (m->dir[a] > 0) to = to > c[a] ? to : c[a];
-            else to = to < c[a] ? to : c[a];
-            to = to < last ? to : last;
-            to = to > first[a] ? to : first[a];
-            if (a == axis) to = m->dir[a] > 0 ? first[a] + (1 << shift) : first[a] - 1;
-            if (to < 0 || (to >= d->cells[a] && to > 0)) return w->t = m->length, 1;
-            w->cell[a] = to, w->at[a] = isogi_dvr__clamp(x - to, 1);
-        }
-        isogi_dvr__walk_to(w);
-        return 1;
-    }
-    for (a = 0; a < 3; a++) m->known[a] = c[a] >> 2;
-    return 0;
+        const float *values = d->level[n].range[isogi_dvr__block_at(d, n, c)];
+        range[0] = (double)values[0], range[1] = (double)values[1];
+    } else for (a = 0; a < 3; a++) m->known[a] = c[a] >> 2;
+    return n;
+}
+
+/* Steps over the largest empty block around the cell: 1 if there is one. */
+static int isogi_dvr__leave_block(isogi_dvr__walk *w) {
+    double range[2];
+    const int n = isogi_dvr__empty_block(w, range);
+    if (n < 0) return 0;
+    /* Where voxels have no value, a block may hold some of them, and what lies behind it need not be near to what lies before it. */
+    if (!w->whole) w->chained = 0;
+    else if (!isogi_dvr__is_quiet(&w->m->dvr->integral, range[0], range[1], w->quiet))
+        w->quiet[0] = range[0], w->quiet[1] = range[1]; /* of one value */
+    w->skipped = 1;
+    isogi_dvr__pass_block(w, n), isogi_dvr__walk_to(w);
+    return 1;
 }
 
 /* The cubic from `in` to `out` (places in the cell) as Bernstein coefficients: values at corners of the box between the two places. Values
@@ -3498,7 +3509,30 @@ static int isogi_dvr__value_at(isogi_dvr__march *m, double t, int cell[3], doubl
     return m->finite;
 }
 
-/* Samples a step apart (Kraus 2005, eq. 5): the pieces between them, taken as monotone. The pieces within one empty block are left out:
+/* The last sample that is surely within the empty blocks which the ray passes one after the other from the sample at t in `cell` on, as
+   long as all their values together count for nothing; beyond `count` where the ray ends in them. Sample `here` if there are none. */
+static uint64_t isogi_dvr__last_empty(isogi_dvr__walk *w, const int cell[3], double t, uint64_t here) {
+    const isogi_dvr__march *m = w->m;
+    double joint[2] = {1.7e308, -1.7e308}, range[2];
+    const double before = w->t;
+    int n;
+    memcpy(w->cell, cell, sizeof w->cell), w->t = t;
+    while (w->t < m->length && (n = isogi_dvr__empty_block(w, range)) >= 0) {
+        if (range[0] < joint[0]) joint[0] = range[0];
+        if (range[1] > joint[1]) joint[1] = range[1];
+        if (joint[0] < joint[1] && !isogi_dvr__is_quiet(&m->dvr->integral, joint[0], joint[1], w->quiet)) break;
+        isogi_dvr__pass_block(w, n);
+    }
+    if (w->t >= m->length) here = m->count + 1;
+    else if (w->t > t) {
+        const uint64_t last = (uint64_t)isogi_dvr__clamp(w->t / m->piece + m->shift - 1e-6, (double)m->count);
+        here = last > here ? last : here;
+    }
+    w->t = before;
+    return here;
+}
+
+/* Samples a step apart (Kraus 2005, eq. 5): the pieces between them, taken as monotone. The pieces within empty blocks are left out:
    nothing that they hold counts. */
 static int isogi_dvr__next_sampled(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
     isogi_dvr__march *m = w->m;
@@ -3506,20 +3540,17 @@ static int isogi_dvr__next_sampled(isogi_dvr__walk *w, isogi_dvr__stretch *p) {
     int cell[3], i;
     while (m->next <= m->count && m->count) {
         double t = isogi_dvr__piece_begin(m, m->next);
-        uint64_t here = m->next++;
+        uint64_t last;
         int had = w->chained;
         if (t > m->length) t = m->length;
         w->chained = isogi_dvr__value_at(m, t, cell, local, &value);
         p->from = p->t0 = w->t, p->to = t, p->dt = t - w->t, p->u0 = 0, p->u1 = 1;
         p->value[0] = w->value, p->value[1] = value;
+        had = had && w->chained && p->dt > 0;
         if (w->chained) w->value = value;
-        w->t = t;
-        if (isogi_dvr__skip(m, cell, t)) {
-            /* to the last sample that is surely within the block: the walk's value is then right for the piece that leaves it */
-            m->next = m->next > here + 2 ? m->next - 2 : here + 1;
-            if (m->next > m->count && here < m->count) m->next = m->count;
-        }
-        if (!had || !w->chained || !(p->dt > 0)) continue;
+        w->t = t, last = isogi_dvr__last_empty(w, cell, t, m->next);
+        if (last > m->next++) m->next = last, w->chained = 0; /* where the piece begins that leaves them */
+        if (!had) continue;
         for (i = 0; i < 4; i++) p->b[i] = p->value[0] + (p->value[1] - p->value[0]) * i / 3;
         memcpy(p->cell, cell, sizeof cell);
         return 1;
