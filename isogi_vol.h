@@ -1023,8 +1023,8 @@ typedef struct isogi_vol__node_level { size_t first, size[3], parents[3]; } isog
 /* Grid coordinates of world points w in floats, to 2^-24 of a cell: (high + low) w + (at_high + at_low). at_high is a multiple of 2^-10, so
    that the number of a cell is subtracted from it exactly; what is left of the sum is small. */
 typedef struct isogi_vol__float_grid {
-    float high[3], low[3], at_high[3], at_low[3];
-    int32_t stride[3]; /* in voxels, hence 2^shift bytes */
+    float high[4], low[4], at_high[4], at_low[4]; /* the fourth is 0 */
+    int32_t stride[3];                            /* in voxels, hence 2^shift bytes */
     int shift, usable;
 } isogi_vol__float_grid;
 
@@ -1036,7 +1036,7 @@ struct isogi_pyramid {
     double to_grid[9];  /* its inverse */
     double origin[3];   /* world position of voxel (0,0,0) */
     double range[2];
-    int cells[3]; /* size - 1 */
+    int cells[4]; /* size - 1; the fourth is 0 */
     isogi_vol__float_grid float_grid;
     double box[4], grid_axis[3][4]; /* cells and the columns of to_grid, for vectors of four; the fourth is 0 */
     isogi_level level[ISOGI_VOL__LEVELS];
@@ -2770,11 +2770,14 @@ static void isogi_vol__grid_point(const isogi_pyramid *p, const isogi_vol__point
 #pragma GCC diagnostic ignored "-Wconversion"
 #endif
 
-/* Cell and place in it of points first .. first + n - 1, moved to the border if outside; n up to a multiple of 16 are filled in. */
+/* A block of few points is 8; else sixteens, as voxels are asked for by them. */
+static int isogi_vol__filled(int n) { return n <= 8 ? 8 : (n + 15) & ~15; }
+
+/* Cell and place in it of points first .. first + n - 1, moved to the border if outside; isogi_vol__filled(n) are filled in. */
 static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
     const isogi_volume *v = &p->volume;
     int i, a;
-    for (i = 0; i < ((n + 15) & ~15); i++) {
+    for (i = 0; i < isogi_vol__filled(n); i++) {
         double grid[3] = {0, 0, 0}, local;
         if (i < n) isogi_vol__grid_point(p, at, first + (size_t)i, grid);
         b->offset[i] = 0;
@@ -2801,7 +2804,7 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
     const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number,
                                                                  it leaves it as an integer in the low bits */
     int i, r;
-    for (i = 0; i < ((n + 15) & ~15); i += 4) {
+    for (i = 0; i < isogi_vol__filled(n); i += 4) {
         __m256d k0, k1, k2, g[3], offset = _mm256_setzero_pd();
         if (at->world && i + 4 <= n) {
             const float *w = at->world[first + (size_t)i];
@@ -2845,7 +2848,7 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, con
     const __m128i width = _mm_cvtsi32_si128(g->shift);
     float some[24];
     int i;
-    for (i = 0; i < ((n + 15) & ~15); i += 8) {
+    for (i = 0; i < isogi_vol__filled(n); i += 8) {
         const float *points = (const float *)world + 3 * (size_t)i;
         __m256 k0, k1, k2;
         __m256i voxel = _mm256_setzero_si256();
@@ -3194,6 +3197,106 @@ ISOGI_VOL__AVX2 static void isogi_vol__trilinear_pairs(const isogi_volume *v, is
 #undef ISOGI_VOL__U16_PAIRS
 #undef ISOGI_VOL__I16_PAIRS
 #undef ISOGI_VOL__F32_PAIRS
+}
+
+/* ---- trilinear values of few points ----
+
+   Where voxels follow each other along x, few points go one after the other, axes side by side. A lane does what the lanes of a block do,
+   so that the size of a call changes no bit. */
+
+#define ISOGI_VOL__FEW 4 /* up to here they are faster than a block */
+
+/* Cell and place in it of a point; lanes x, y, z, 0: as isogi_vol__locate_floats does, then as isogi_vol__locate_avx2. */
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m128 isogi_vol__locate_float(const isogi_pyramid *p, const float world[3], __m128i *found) {
+    const isogi_vol__float_grid *g = &p->float_grid;
+    const __m128 zero = _mm_setzero_ps(), one = _mm_set1_ps(1), w = _mm_setr_ps(world[0], world[1], world[2], 0);
+    const __m128 high = _mm_loadu_ps(g->high), at_high = _mm_loadu_ps(g->at_high);
+    const __m128i end = _mm_sub_epi32(_mm_loadu_si128((const __m128i *)(const void *)p->cells), _mm_set1_epi32(1));
+    const __m128 guess = _mm_fmadd_ps(high, w, _mm_sub_ps(at_high, _mm_set1_ps(1.0f / 256)));
+    __m128i cell = _mm_cvttps_epi32(_mm_min_ps(guess, _mm_cvtepi32_ps(end)));
+    __m128 local, next;
+    cell = _mm_max_epi32(cell, _mm_setzero_si128());
+    local = _mm_add_ps(_mm_fmadd_ps(high, w, _mm_sub_ps(at_high, _mm_cvtepi32_ps(cell))),
+                       _mm_fmadd_ps(_mm_loadu_ps(g->low), w, _mm_loadu_ps(g->at_low)));
+    next = _mm_and_ps(_mm_castsi128_ps(_mm_cmpgt_epi32(end, cell)), _mm_cmpge_ps(local, one));
+    *found = _mm_sub_epi32(cell, _mm_castps_si128(next));
+    return _mm_min_ps(_mm_max_ps(_mm_sub_ps(local, _mm_and_ps(next, one)), zero), one);
+}
+
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m128 isogi_vol__locate_double(const isogi_pyramid *p, const isogi_vol__points *at, size_t i,
+                                                                  __m128i *found) {
+    __m256d g;
+    __m128i cell;
+    if (at->grid) g = _mm256_setr_pd(at->grid[i][0], at->grid[i][1], at->grid[i][2], 0);
+    else {
+        const float *w = at->world[i];
+        const double *o = p->origin;
+        g = _mm256_mul_pd(_mm256_loadu_pd(p->grid_axis[0]), _mm256_set1_pd((double)w[0] - o[0]));
+        g = _mm256_fmadd_pd(_mm256_loadu_pd(p->grid_axis[1]), _mm256_set1_pd((double)w[1] - o[1]), g);
+        g = _mm256_fmadd_pd(_mm256_loadu_pd(p->grid_axis[2]), _mm256_set1_pd((double)w[2] - o[2]), g);
+    }
+    g = _mm256_min_pd(_mm256_max_pd(g, _mm256_setzero_pd()), _mm256_loadu_pd(p->box)); /* NaN gives 0 */
+    cell = _mm_sub_epi32(_mm_loadu_si128((const __m128i *)(const void *)p->cells), _mm_set1_epi32(1));
+    *found = cell = _mm_max_epi32(_mm_min_epi32(_mm256_cvttpd_epi32(g), cell), _mm_setzero_si128()); /* in any case */
+    return _mm256_cvtpd_ps(_mm256_sub_pd(g, _mm256_cvtepi32_pd(cell)));
+}
+
+/* Corners x + 2y + 4z of the cell whose first voxel is at p. */
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m256 isogi_vol__corners_of(const isogi_volume *v, const char *p) {
+    const char *p1 = v->size[1] > 1 ? p + v->stride[1] : p, *p2 = v->size[2] > 1 ? p + v->stride[2] : p, *p3 = p2 + (p1 - p);
+    __m128i all;
+    if (v->type == ISOGI_F32) {
+        const __m128 low = _mm_loadh_pi(_mm_castsi128_ps(ISOGI_VOL__EIGHT(p)), (const __m64 *)(const void *)p1);
+        return _mm256_set_m128(_mm_loadh_pi(_mm_castsi128_ps(ISOGI_VOL__EIGHT(p2)), (const __m64 *)(const void *)p3), low);
+    }
+    if (v->type == ISOGI_U16 || v->type == ISOGI_I16) {
+        all = _mm_unpacklo_epi64(_mm_unpacklo_epi32(isogi_vol__four_bytes(p), isogi_vol__four_bytes(p1)),
+                                 _mm_unpacklo_epi32(isogi_vol__four_bytes(p2), isogi_vol__four_bytes(p3)));
+        return _mm256_cvtepi32_ps(v->type == ISOGI_U16 ? _mm256_cvtepu16_epi32(all) : _mm256_cvtepi16_epi32(all));
+    }
+    all = _mm_cvtsi32_si128(isogi_vol__two_bytes(p));
+    all = _mm_insert_epi16(all, isogi_vol__two_bytes(p1), 1), all = _mm_insert_epi16(all, isogi_vol__two_bytes(p2), 2);
+    all = _mm_insert_epi16(all, isogi_vol__two_bytes(p3), 3);
+    return _mm256_cvtepi32_ps(v->type == ISOGI_U8 ? _mm256_cvtepu8_epi32(all) : _mm256_cvtepi8_epi32(all));
+}
+
+/* Lanes: gradient of raw voxels per grid unit, if asked for, and value. A lane blends twice; where it is the gradient's, differences of
+   corners, where it is the value's, the four edges along x, blended already. */
+ISOGI_VOL__AVX2 ISOGI_VOL__INLINE __m128 isogi_vol__blend_corners(__m256 c, __m128 at, int gradients) {
+    const __m128 low = _mm256_castps256_ps128(c), high = _mm256_extractf128_ps(c, 1), one = _mm_set1_ps(1);
+    const __m128 x = _mm_permute_ps(at, 0), rest = _mm_sub_ps(one, x);
+    const __m128 edges = _mm_fmadd_ps(x, ISOGI_VOL__ODD(low, high), _mm_mul_ps(rest, ISOGI_VOL__EVEN(low, high)));
+    const __m128 once = _mm_permute_ps(at, 0x41), twice = _mm_permute_ps(at, 0x9a), rest1 = _mm_sub_ps(one, once);
+    const __m128 rest2 = _mm_sub_ps(one, twice), back = _mm_movehl_ps(edges, edges);
+    __m128 near = _mm_permute_ps(edges, 0), far = _mm_permute_ps(back, 0);
+    __m256 from, to;
+    if (!gradients) {
+        near = _mm_fmadd_ps(once, _mm_permute_ps(edges, 0x55), _mm_mul_ps(rest1, near));
+        far = _mm_fmadd_ps(once, _mm_permute_ps(back, 0x55), _mm_mul_ps(rest1, far));
+        return _mm_fmadd_ps(twice, far, _mm_mul_ps(rest2, near));
+    }
+#define ISOGI_VOL__PICK(...) _mm256_permutevar8x32_ps(c, _mm256_setr_epi32(__VA_ARGS__))
+    from = _mm256_sub_ps(ISOGI_VOL__PICK(1, 2, 4, 0, 5, 6, 6, 0), ISOGI_VOL__PICK(0, 0, 0, 0, 4, 4, 2, 0));
+    to = _mm256_sub_ps(ISOGI_VOL__PICK(3, 3, 5, 0, 7, 7, 7, 0), ISOGI_VOL__PICK(2, 1, 1, 0, 6, 5, 3, 0));
+#undef ISOGI_VOL__PICK
+    from = _mm256_blend_ps(from, _mm256_set_m128(far, near), 0x88);
+    to = _mm256_blend_ps(to, _mm256_permute_ps(_mm256_set_m128(back, edges), 0x55), 0x88);
+    to = _mm256_fmadd_ps(_mm256_set_m128(once, once), to, _mm256_mul_ps(_mm256_set_m128(rest1, rest1), from));
+    return _mm_fmadd_ps(twice, _mm256_extractf128_ps(to, 1), _mm_mul_ps(rest2, _mm256_castps256_ps128(to)));
+}
+
+ISOGI_VOL__AVX2 static void isogi_vol__trilinear_few(const isogi_pyramid *p, const isogi_vol__points *at, int n, int gradients,
+                                                     float raw[ISOGI_VOL__FEW][4]) {
+    const isogi_volume *v = &p->volume;
+    int i;
+    for (i = 0; i < n; i++) {
+        __m128i cell;
+        const __m128 local = at->world && p->float_grid.usable ? isogi_vol__locate_float(p, at->world[i], &cell)
+                                                               : isogi_vol__locate_double(p, at, (size_t)i, &cell);
+        const char *first = (const char *)v->data + _mm_cvtsi128_si32(cell) * v->stride[0] + _mm_extract_epi32(cell, 1) * v->stride[1] +
+                            _mm_extract_epi32(cell, 2) * v->stride[2];
+        _mm_storeu_ps(raw[i], isogi_vol__blend_corners(isogi_vol__corners_of(v, first), local, gradients));
+    }
 }
 
 #define ISOGI_VOL__MADD_avx512 _mm512_fmadd_ps
@@ -3672,11 +3775,19 @@ static void isogi_vol__cubic_block(const isogi_pyramid *p, isogi_filter filter, 
     }
 }
 
+#ifdef ISOGI_VOL__AVX
+/* Whether two voxels along x are one load. */
+static int isogi_vol__in_pairs(const isogi_pyramid *p) {
+    const isogi_volume *v = &p->volume;
+    return p->path >= ISOGI_VOL__PATH_AVX2 && v->size[0] > 1 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type);
+}
+#endif
+
 static void isogi_vol__trilinear_block(const isogi_pyramid *p, isogi_vol__block *b, int n, int gradients) {
     const isogi_volume *v = &p->volume;
-    n = (n + 15) & ~15;
+    n = isogi_vol__filled(n);
 #ifdef ISOGI_VOL__AVX
-    if (p->path >= ISOGI_VOL__PATH_AVX2 && v->size[0] > 1 && v->stride[0] == (ptrdiff_t)isogi_vol__type_size(v->type)) {
+    if (isogi_vol__in_pairs(p)) {
         isogi_vol__trilinear_pairs(v, b, n, gradients);
         return;
     }
@@ -3712,6 +3823,19 @@ ISOGI_VOL__INLINE void isogi_vol__gradient_out(const double m[9], float gx, floa
 }
 
 #ifdef ISOGI_VOL__AVX
+/* n points, at most ISOGI_VOL__FEW. No compiler fuses what comes last, as it might in code for AVX2. */
+static void isogi_vol__sample_few(const isogi_pyramid *p, const isogi_vol__points *at, int n, float *values, float (*gradients)[3]) {
+    const double scale = p->volume.scale, bias = p->volume.bias;
+    const int identity = scale >= 1 && scale <= 1 && bias >= 0 && bias <= 0;
+    float raw[ISOGI_VOL__FEW][4];
+    double m[9];
+    int i;
+    isogi_vol__trilinear_few(p, at, n, gradients != NULL, raw);
+    for (i = 0; i < n && values; i++) values[i] = identity ? raw[i][3] : (float)(scale * (double)raw[i][3] + bias);
+    for (i = 0; i < 9 && gradients; i++) m[i] = scale * p->to_grid[i];
+    for (i = 0; i < n && gradients; i++) isogi_vol__gradient_out(m, raw[i][0], raw[i][1], raw[i][2], gradients[i]);
+}
+
 /* Values and gradients from sums of raw voxels: {value, x, y, z} of n points. */
 ISOGI_VOL__AVX2 static void isogi_vol__sums_out_avx2(const isogi_pyramid *p, const double m[9], const float *sum, int n, float *values,
                                                      float (*gradients)[3]) {
@@ -3834,6 +3958,10 @@ static isogi_result isogi_vol__sample(const isogi_pyramid *p, isogi_filter filte
         if (filter == ISOGI_FILTER_LINEAR && world && p->path >= ISOGI_VOL__PATH_AVX512 &&
             isogi_vol__sample16(p, world, count, values, gradients))
             return ISOGI_OK;
+        if (filter == ISOGI_FILTER_LINEAR && count <= ISOGI_VOL__FEW && isogi_vol__in_pairs(p)) {
+            isogi_vol__sample_few(p, &at, (int)count, values, gradients);
+            return ISOGI_OK;
+        }
 #endif
         isogi_vol__sample_blocks(p, filter, &at, count, values, gradients);
         return ISOGI_OK;
@@ -10474,6 +10602,7 @@ ISOGI_API void isogi_vol_mesh_free(const isogi_pyramid *pyramid, isogi_mesh *mes
 #undef ISOGI_VOL__STRIP_VOXELS
 #undef ISOGI_VOL__HUGE_PAGE
 #undef ISOGI_VOL__FAST_SIZE
+#undef ISOGI_VOL__FEW
 #undef ISOGI_VOL__FOUR
 #undef ISOGI_VOL__EVEN
 #undef ISOGI_VOL__ODD

@@ -535,6 +535,48 @@ TEST(the_size_of_a_call_changes_no_bit) {
         }
 }
 
+/* Calls of one point, and of few, have ways of their own: for each type, layout and way to tell where points are, at the border, outside,
+   and where an axis has one voxel; values, gradients, or both. */
+TEST(few_points_have_the_bits_of_many) {
+    enum { COUNT = 36, PATHS_OF_BLOCKS = 3 };
+    static float points[COUNT][3], value[2][COUNT], gradient[2][COUNT][3];
+    static double grid[COUNT][3];
+    test_random r = {13};
+    for (int n = 0; n < 6 * 4 * LAYOUTS * PATHS_OF_BLOCKS; n++) {
+        const int path = 2 + n % PATHS_OF_BLOCKS, kind = n / PATHS_OF_BLOCKS, layout = kind % LAYOUTS, oriented = kind / LAYOUTS % 2;
+        const int from_grid = kind / LAYOUTS / 2 % 2;
+        const int y = layout == CHUNK || kind % 3 ? 4 : 1, z = (layout == CHUNK ? 2 : 1) + kind % 5;
+        lattice l = lattice_new((isogi_type)(kind / LAYOUTS / 4), layout, 5, y, z, &r);
+        const isogi_context context = {.threads = 1, .force_path = path};
+        isogi_pyramid *p = NULL;
+        l.volume.spacing[kind % 3] = 0.7;
+        for (int a = 0; a < 3; a++) l.volume.origin[a] = 1.7 - 2 * a;
+        for (int a = 0; a < 3 && oriented; a++) l.volume.axes[4 * a] = 1, l.volume.axes[3 * a + (a + 1) % 3] = 0.25;
+        CHECK(isogi_vol_build(&p, &l.volume, &context) == ISOGI_OK, "built");
+        for (int i = 0; i < COUNT; i++) {
+            double world[3];
+            for (int a = 0; a < 3; a++) grid[i][a] = random_range(&r, -1, l.size[a]);
+            if (i % 8 == 7) grid[i][i % 3] = floor(grid[i][i % 3]);
+            isogi_vol_to_world(p, grid[i], world);
+            for (int a = 0; a < 3; a++) points[i][a] = (float)world[a];
+        }
+        for (int f = 0; f < 3; f++)
+            for (int few = COUNT; few; few = few == COUNT ? 9 : few - 1)
+                for (int i = 0; i < COUNT; i += few) {
+                    const size_t count = (size_t)(few < COUNT - i ? few : COUNT - i);
+                    float *v = few < COUNT && (few + i) % 3 == 0 ? NULL : value[few < COUNT] + i;
+                    float(*g)[3] = few < COUNT && (few + i) % 3 == 1 ? NULL : gradient[few < COUNT] + i;
+                    if (from_grid) isogi_vol_sample_grid(p, filters[f], (const double(*)[3])grid + i, count, v, g);
+                    else isogi_vol_sample_filtered(p, filters[f], (const float(*)[3])points + i, count, v, g);
+                    CHECK((!v || !memcmp(v, value[0] + i, count * sizeof *v)) && (!g || !memcmp(g, gradient[0] + i, count * sizeof *g)),
+                          "type %d, layout %d, path %d, %s, axes %d, grid %d: %d points from %d on", (int)l.volume.type, layout, path,
+                          filter_names[f], oriented, from_grid, few, i);
+                }
+        isogi_vol_free(p);
+        free(l.memory);
+    }
+}
+
 /* ---- places that are none, calls that are wrong ---- */
 
 TEST(points_that_are_not_finite_lie_somewhere_in_the_box) {

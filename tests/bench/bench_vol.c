@@ -256,7 +256,7 @@ static double worst_sample(const scene *s, const float (*points)[3], const float
     return worst;
 }
 
-enum { ALONG_RAYS, FAR_RAYS, ANYWHERE };              /* where samples are */
+enum { ALONG_RAYS, FAR_RAYS, ANYWHERE, ALONE };       /* where samples are; ALONE: as FAR_RAYS, a point a call */
 enum { TRILINEAR, TRILINEAR_GRADIENTS, TRICUBIC };    /* what is sampled */
 enum { TILES = 64, LONGEST = 1024, SPREAD = 1 << 21 };/* rays a call; points a ray at most; points that are not along all rays */
 static const char *const samplings[] = {"", "value and gradient; ", "value and gradient; "};
@@ -285,10 +285,10 @@ static void spread_points(const scene *s, int places, float (*points)[3]) {
 }
 
 /* Along all primary rays in their order, those of four tiles of pixels a call; or all points in one call, of rays 32 pixels apart or
-   anywhere. Making the points takes no time. bytes: the field in 8 bits. */
+   anywhere; or each point in a call of its own. Making the points takes no time. bytes: the field in 8 bits. */
 static void bench_samples(const scene *s, const char *name, int what, int places, int bytes) {
     const size_t most = places == ALONG_RAYS ? TILES * LONGEST : SPREAD, voxels = (size_t)N * N * N;
-    const size_t calls = places == ALONG_RAYS ? RAYS / TILES : 1, row_of_tiles = 4 * WIDTH / TILES;
+    const size_t calls = places == ALONG_RAYS ? RAYS / TILES : 1, row_of_tiles = 4 * WIDTH / TILES, together = places == ALONE ? 1 : most;
     float(*points)[3] = (float(*)[3])malloc(most * sizeof *points), (*gradients)[3] = (float(*)[3])malloc(most * sizeof *gradients);
     float *values = (float *)malloc(most * sizeof *values);
     uint8_t *raw = (uint8_t *)malloc(bytes ? voxels : 1);
@@ -311,8 +311,12 @@ static void bench_samples(const scene *s, const char *name, int what, int places
             for (size_t i = 0; i < TILES && places == ALONG_RAYS; i++) count += points_along(&s->primary[call * TILES + i], points + count);
             if (places != ALONG_RAYS) count = SPREAD;
             used -= cpu_seconds();
-            if (what == TRICUBIC) isogi_vol_sample_smooth(pyramid, (const float(*)[3])points, count, values, gradients);
-            else isogi_vol_sample(pyramid, (const float(*)[3])points, count, values, what == TRILINEAR ? NULL : gradients);
+            for (size_t i = 0, n; i < count; i += n) {
+                const float(*at)[3] = (const float(*)[3])points + i;
+                n = count - i < together ? count - i : together;
+                if (what == TRICUBIC) isogi_vol_sample_smooth(pyramid, at, n, values + i, gradients + i);
+                else isogi_vol_sample(pyramid, at, n, values + i, what == TRILINEAR ? NULL : gradients + i);
+            }
             used += cpu_seconds(), work += (double)count;
             if (run < 0)
                 worst = fmax(worst, worst_sample(s, (const float(*)[3])points, values, count, what == TRICUBIC, bytes ? 1 / 85.0 : 1,
@@ -323,7 +327,7 @@ static void bench_samples(const scene *s, const char *name, int what, int places
     if (places == ALONG_RAYS)
         snprintf(setting, sizeof setting, "%serror: largest of value; 1024x1024 rays in every %zuth row of tiles; %d a call",
                  samplings[what], every, TILES);
-    else snprintf(setting, sizeof setting, "%serror: largest of value", samplings[what]);
+    else snprintf(setting, sizeof setting, "%serror: largest of value%s", samplings[what], places == ALONE ? "; 1 a call" : "");
     row(name, NULL, "default", setting, median(seconds, runs), worst, work, "samples");
     if (bytes) {
         isogi_vol_free(pyramid);
@@ -463,6 +467,8 @@ int main(int argc, char **argv) {
             bench_samples(&s, "trilinear-gradients-along-rays", TRILINEAR_GRADIENTS, ALONG_RAYS, 0);
             bench_samples(&s, "trilinear-bytes-along-rays", TRILINEAR, ALONG_RAYS, 1);
             bench_samples(&s, "trilinear-bytes-along-far-rays", TRILINEAR, FAR_RAYS, 1);
+            bench_samples(&s, "trilinear-alone", TRILINEAR, ALONE, 0);
+            bench_samples(&s, "trilinear-gradients-alone", TRILINEAR_GRADIENTS, ALONE, 0);
             bench_samples(&s, "tricubic-along-rays", TRICUBIC, ALONG_RAYS, 0);
             bench_samples(&s, "tricubic-along-far-rays", TRICUBIC, FAR_RAYS, 0);
             bench_samples(&s, "tricubic-bytes-along-rays", TRICUBIC, ALONG_RAYS, 1);

@@ -19,7 +19,7 @@ wanted() {
     vol) for field in ml256 gyroid256; do
             for rays in primary1 primary16 surface anyhit bundle64; do echo $rays-$field; done
          done
-         echo pyramid-256 trilinear-along-rays tricubic-along-rays tricubic-random mesh-gyroid256 mesh-normals-gyroid256 ;;
+         echo pyramid-256 trilinear-along-rays trilinear-alone tricubic-along-rays tricubic-random mesh-gyroid256 mesh-normals-gyroid256 ;;
     trace) for scene in engine-block $(have engine_256x256x128_uint8.raw engine) ${dry:+bonsai cthead}; do
             echo speedup-$scene speedup-$scene:naive filter-$scene filter-$scene:filter-off rays-$scene threads-$scene lazy-$scene \
                 lazy-converged-$scene "$scene*5"
