@@ -5638,19 +5638,78 @@ static void isogi_sh__add_sample(double *c, int order, int channels, const doubl
     }
 }
 
+/* Samples, each with its weight in its values, that wait until there are as many as are evaluated together. */
+#define ISOGI_SH__BASIS 1792 /* functions of one batch: of 16 directions to order 10, of 4 at order 21 */
+typedef struct isogi_sh__samples {
+    double direction[3][16], value[ISOGI_SH__CHANNELS][16];
+    int order, channels, count, most;
+} isogi_sh__samples;
+
+static void isogi_sh__samples_start(isogi_sh__samples *s, double *c, int order, int channels) {
+    int i;
+    s->order = order, s->channels = channels, s->count = 0, s->most = 1;
+    for (i = 0; i < channels * order * order; i++) c[i] = 0;
+#ifdef ISOGI_SH__SIMD
+    if (order <= ISOGI_SH__TABLE_ORDER && isogi_sh__level())
+        s->most = order <= 10 ? 16 : ISOGI_SH__BASIS / (order * order) / 4 * 4;
+#endif
+}
+
+#ifdef ISOGI_SH__SIMD
+ISOGI_SH__AVX2 static void isogi_sh__add_lanes(double *c, const isogi_sh__samples *s, const double *y, int lanes) {
+    int i, j, k;
+    for (i = 0; i < s->order * s->order; i++, y += lanes, c += s->channels)
+        for (k = 0; k < s->channels; k++) {
+            isogi_sh__d4 sum = *(const isogi_sh__d4 *)y * *(const isogi_sh__d4 *)s->value[k];
+            for (j = 4; j < lanes; j += 4)
+                sum = ISOGI_SH__FMA_D4(*(const isogi_sh__d4 *)(y + j), *(const isogi_sh__d4 *)(s->value[k] + j), sum);
+            c[k] += (sum[0] + sum[1]) + (sum[2] + sum[3]);
+        }
+}
+
+/* In lanes, of which those that no sample fills count nothing. 0: a direction is not for vector units. */
+static int isogi_sh__add_batch(double *c, isogi_sh__samples *s) {
+    double y[ISOGI_SH__BASIS];
+    int i, k, lanes = (s->count + 3) / 4 * 4;
+    for (i = s->count; i < lanes; i++) {
+        s->direction[0][i] = s->direction[1][i] = 0, s->direction[2][i] = 1;
+        for (k = 0; k < s->channels; k++) s->value[k][i] = 0;
+    }
+    if (isogi_sh__eval_columns_f64(y, (size_t)lanes, s->order < 3 ? 3 : s->order, s->direction[0], s->direction[1], s->direction[2],
+                                   (size_t)lanes) < (size_t)lanes)
+        return 0;
+    isogi_sh__add_lanes(c, s, y, lanes);
+    return 1;
+}
+#endif
+
+static void isogi_sh__add_samples(double *c, isogi_sh__samples *s) {
+    double value[ISOGI_SH__CHANNELS];
+    int i, k, count = s->count;
+#ifdef ISOGI_SH__SIMD
+    if (count > 1 && isogi_sh__add_batch(c, s)) count = 0;
+#endif
+    for (i = 0; i < count; i++) {
+        for (k = 0; k < s->channels; k++) value[k] = s->value[k][i];
+        isogi_sh__add_sample(c, s->order, s->channels, value,
+                             isogi_sh__normalise(s->direction[0][i], s->direction[1][i], s->direction[2][i]));
+    }
+    s->count = 0;
+}
+
 ISOGI_API isogi_result isogi_sh_project_samples(double *c, int order, int channels, const float (*direction)[3], const float *value,
                                                 const float *weight, size_t count) {
-    double weighted[ISOGI_SH__CHANNELS];
+    isogi_sh__samples s;
     size_t i;
     int k;
     if (!c || !isogi_sh__shape_ok(order, channels) || (count && (!direction || !value))) return ISOGI_INVALID;
     if (!isogi_sh__samples_fit(count, channels, sizeof *value)) return ISOGI_TOO_LARGE;
-    for (k = 0; k < channels * order * order; k++) c[k] = 0;
+    isogi_sh__samples_start(&s, c, order, channels);
     for (i = 0; i < count; i++) {
-        const float *d = direction[i];
         double w = weight ? (double)weight[i] : 4 * ISOGI_SH__PI / (double)count;
-        for (k = 0; k < channels; k++) weighted[k] = w * (double)value[i * (size_t)channels + (size_t)k];
-        isogi_sh__add_sample(c, order, channels, weighted, isogi_sh__normalise((double)d[0], (double)d[1], (double)d[2]));
+        for (k = 0; k < 3; k++) s.direction[k][s.count] = (double)direction[i][k];
+        for (k = 0; k < channels; k++) s.value[k][s.count] = w * (double)value[i * (size_t)channels + (size_t)k];
+        if (++s.count == s.most || i + 1 == count) isogi_sh__add_samples(c, &s);
     }
     return ISOGI_OK;
 }
@@ -5666,6 +5725,7 @@ static double isogi_sh__random(uint64_t *state) {
 ISOGI_API isogi_result isogi_sh_project_random(double *c, int order, int channels, size_t samples, int stratified, uint64_t seed,
                                                void (*function)(void *user, const double direction[3], double *value), void *user) {
     double value[ISOGI_SH__CHANNELS];
+    isogi_sh__samples s;
     size_t i, rows = 1, columns = 1;
     int k;
     if (!c || !function || !isogi_sh__shape_ok(order, channels) || samples < 1) return ISOGI_INVALID;
@@ -5676,7 +5736,7 @@ ISOGI_API isogi_result isogi_sh_project_random(double *c, int order, int channel
         columns = (samples + rows - 1) / rows;
         samples = rows * columns;
     }
-    for (k = 0; k < channels * order * order; k++) c[k] = 0;
+    isogi_sh__samples_start(&s, c, order, channels);
     for (i = 0; i < samples; i++) {
         double a = isogi_sh__random(&seed), b = isogi_sh__random(&seed), direction[3], z, sine, phi;
         z = 1 - 2 * ((double)(i / columns % rows) + a) / (double)rows;
@@ -5684,8 +5744,9 @@ ISOGI_API isogi_result isogi_sh_project_random(double *c, int order, int channel
         sine = sqrt((1 - z) * (1 + z));
         direction[0] = sine * cos(phi), direction[1] = sine * sin(phi), direction[2] = z;
         function(user, direction, value);
-        for (k = 0; k < channels; k++) value[k] *= 4 * ISOGI_SH__PI / (double)samples;
-        isogi_sh__add_sample(c, order, channels, value, isogi_sh__normalise(direction[0], direction[1], z));
+        for (k = 0; k < 3; k++) s.direction[k][s.count] = direction[k];
+        for (k = 0; k < channels; k++) s.value[k][s.count] = value[k] * (4 * ISOGI_SH__PI / (double)samples);
+        if (++s.count == s.most || i + 1 == samples) isogi_sh__add_samples(c, &s);
     }
     return ISOGI_OK;
 }
@@ -6578,6 +6639,7 @@ ISOGI_API isogi_result isogi_sh_fit_directional(float direction[3], float rgb[3]
 #undef ISOGI_SH__LANES
 #undef ISOGI_SH__CHANNELS
 #undef ISOGI_SH__GROUP
+#undef ISOGI_SH__BASIS
 #undef ISOGI_SH__LOW
 #undef ISOGI_SH__NARROW
 #undef ISOGI_SH__DERING_ORDER
