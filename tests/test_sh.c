@@ -1047,6 +1047,40 @@ TEST(weighted_samples_project) {
     CHECK(fabs(c[0] - 4 * pi * (double)value[0] * sqrt(1 / (4 * pi))) < 1e-6, "%g", c[0]);
 }
 
+/* Batches that are full, that are not and that hold a direction of no use, of every channel and at every level: the sum of the samples,
+   each by itself. What no sample fills counts nothing, and a value that is not finite stays in its channel. */
+TEST(samples_in_batches_are_sums_of_samples) {
+    static const int orders[] = {1, 2, 5, 10, 12, 21, 22}, channels[] = {1, 3, 16};
+    static float d[40][3], value[16 * 40], weight[40];
+    static double c[16 * 22 * 22], one[16 * 22 * 22], expected[16 * 22 * 22];
+    test_random r = {71};
+    double worst = 0;
+    int round = 0, bad = 0;
+    for (instruction_level = 0; instruction_level < 3 && instruction_level <= BEST_LEVEL; instruction_level++)
+        for (int o = 0; o < 7; o++, round++) {
+            const int order = orders[o], some = channels[round % 3], n = some * order * order, count = 1 + round * 13 % 40;
+            for (int i = 0; i < 40; i++) {
+                for (int k = 0; k < 3; k++) d[i][k] = (float)random_range(&r, -1, 1);
+                for (int k = 0; k < 16; k++) value[16 * i + k] = (float)random_range(&r, -1, 1);
+                weight[i] = (float)random_range(&r, 0, 1);
+            }
+            if (round % 2) d[count / 2][0] = NAN;
+            for (int i = 0; i < n; i++) expected[i] = 0;
+            for (int i = 0; i < count; i++) {
+                isogi_sh_project_samples(one, order, some, (const float(*)[3])d + i, value + some * i, weight + i, 1);
+                for (int k = 0; k < n; k++) expected[k] += one[k];
+            }
+            value[some - 1] = round % 3 == 2 ? INFINITY : value[some - 1];
+            isogi_sh_project_samples(c, order, some, (const float(*)[3])d, value, weight, (size_t)count);
+            for (int k = 0; k < n; k++) {
+                if (round % 3 == 2 && k % some == some - 1) bad += test_finite(c[k]);
+                else worst = fmax(worst, test_finite(c[k]) ? fabs(c[k] - expected[k]) : 1e9);
+            }
+        }
+    instruction_level = BEST_LEVEL;
+    CHECK(worst < 1e-12 * ROUNDING_FACTOR && !bad, "%g; %d values are finite", worst, bad);
+}
+
 /* Images and coefficients next to the largest float, turned, with every set of instructions: what comes of them 2^64 times darker, times
    2^64, as far as floats go. */
 TEST(environments_beyond_the_range_of_floats) {
