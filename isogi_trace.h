@@ -150,7 +150,7 @@
    - ISOGI_TRACE_IMPLEMENTATION   implements this one alone
    - ISOGI_NO_THREADS, ISOGI_NO_SIMD, ISOGI_API  as in isogi_vol.h
 
-   Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 104 where one of its texels is wanted, and for every
+   Memory       Through the context. Bricks of 4x4x4 texels: 8 bytes for each, 112 where one of its texels is wanted, and for every
                 wanted texel alone 2 + 12 bytes of irradiance, 2 + 2 order^2 channels of transfer, less in other formats; and
                 180 KB. isogi_trace_memory tells. PATHS needs another 4 MB, FEEDBACK 10 (TRANSFER: 32 KB more for each coefficient),
                 and while it works some 400 bytes (TRANSFER: 16 more for each coefficient), 8 MB of them at once of texels and as
@@ -2266,10 +2266,11 @@ enum {
 typedef struct isogi_trace__brick {
     uint8_t state[ISOGI_TRACE__TEXELS];
     int queued;
-    uint32_t newest;  /* the largest number in `node` */
+    uint32_t newest;    /* the largest number in `node`, */
+    uint32_t around[2]; /* and in those of the bricks up to 1 and up to 2 away, as far as it is newer than its first */
     uint64_t held;
-    uint8_t *records; /* NULL until one of them is computed */
-    uint32_t *node;   /* number + 1 of what gathers each texel's light, 0 = none; NULL = none at all */
+    uint8_t *records;   /* NULL until one of them is computed */
+    uint32_t *node;     /* number + 1 of what gathers each texel's light, 0 = none; NULL = none at all */
 } isogi_trace__brick;
 
 typedef struct isogi_trace__ref {
@@ -6176,23 +6177,10 @@ static void isogi_trace__publish_brick(isogi_trace *t, size_t i, isogi_trace__de
 
 /* Whether a brick's light stays as it is: no texel that does not rest is in one of the bricks around, which the filter reads, or, where it
    goes in two rounds, in one of those around them. */
-static int isogi_trace__brick_rests(const isogi_trace *t, const isogi_trace__node *any) {
+static int isogi_trace__brick_rests(const isogi_trace *t, const isogi_trace__brick *brick) {
     const size_t resting = isogi_trace__resting(t->feedback);
-    const size_t reach = t->feedback->phase == ISOGI_TRACE__PUBLISH && isogi_trace__piloted(t) ? 2 : 1;
-    size_t low[3], high[3], x, y, z;
-    int a;
-    for (a = 0; a < 3 && resting; a++) {
-        const size_t brick = any->texel[a] / ISOGI_TRACE__SIDE;
-        low[a] = brick > reach ? brick - reach : 0, high[a] = brick + reach < t->size[a] ? brick + reach : t->size[a] - 1;
-    }
-    if (!resting || any->brick->newest > resting) return 0;
-    for (z = low[2]; z <= high[2]; z++)
-        for (y = low[1]; y <= high[1]; y++)
-            for (x = low[0]; x <= high[0]; x++) {
-                const isogi_trace__brick *other = t->bricks[x + t->size[0] * (y + t->size[1] * z)];
-                if (other && other->newest > resting) return 0;
-            }
-    return 1;
+    const int two = t->feedback->phase == ISOGI_TRACE__PUBLISH && isogi_trace__piloted(t);
+    return brick->newest <= resting && brick->around[two] <= resting;
 }
 
 /* Nodes of a sweep. Where the filter is at work, bricks at a time: each with the sweep that has the last of its nodes. */
@@ -6203,7 +6191,7 @@ static void isogi_trace__publish_sweep(isogi_trace *t, size_t sweep, isogi_trace
         const isogi_trace__node *n = isogi_trace__node_at(set, i);
         if (!block) {
             if (i >= isogi_trace__resting(t->feedback) && isogi_trace__unpublished(t, i)) isogi_trace__publish(t, i, NULL);
-        } else if (n->brick->newest == i + 1 && !isogi_trace__brick_rests(t, n)) isogi_trace__publish_brick(t, i, block);
+        } else if (n->brick->newest == i + 1 && !isogi_trace__brick_rests(t, n->brick)) isogi_trace__publish_brick(t, i, block);
     }
 }
 
@@ -6504,6 +6492,23 @@ static uint64_t isogi_trace__place(isogi_trace *t, uint64_t limit) {
     return fresh.count / 2 + 1;
 }
 
+/* Tells the bricks around one of its newest node. Those that have no nodes yet need not know: theirs will be newer. */
+static void isogi_trace__tell_around(isogi_trace *t, size_t index) {
+    const size_t at[3] = {index % t->size[0], index / t->size[0] % t->size[1], index / t->size[0] / t->size[1]};
+    size_t low[3], high[3], x, y, z;
+    int a;
+    for (a = 0; a < 3; a++) low[a] = at[a] > 2 ? at[a] - 2 : 0, high[a] = at[a] + 2 < t->size[a] ? at[a] + 2 : t->size[a] - 1;
+    for (z = low[2]; z <= high[2]; z++)
+        for (y = low[1]; y <= high[1]; y++)
+            for (x = low[0]; x <= high[0]; x++) {
+                isogi_trace__brick *other = t->bricks[x + t->size[0] * (y + t->size[1] * z)];
+                if (!other || !other->node) continue;
+                other->around[1] = t->bricks[index]->newest;
+                if (x + 1 >= at[0] && x <= at[0] + 1 && y + 1 >= at[1] && y <= at[1] + 1 && z + 1 >= at[2] && z <= at[2] + 1)
+                    other->around[0] = other->around[1];
+            }
+}
+
 /* Numbers of nodes for the wanted texels of a brick; even: of those that are even along all axes. */
 static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even) {
     isogi_trace__set *set = &t->feedback->texels;
@@ -6516,7 +6521,9 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         brick->node = (uint32_t *)isogi_allocate(&t->context, ISOGI_TRACE__TEXELS, sizeof(uint32_t));
         if (!brick->node) return ISOGI_NO_MEMORY;
         memset(brick->node, 0, ISOGI_TRACE__TEXELS * sizeof(uint32_t));
+        brick->around[0] = brick->around[1] = 0;
     }
+    if (!left) return ISOGI_OK;
     for (; left; left &= left - 1) {
         slot = isogi_trace__lowest_bit(left);
         memset(isogi_trace__stage_at(set, set->count), 0, sizeof(isogi_trace__stage));
@@ -6524,6 +6531,7 @@ static isogi_result isogi_trace__nodes_of(isogi_trace *t, size_t index, int even
         brick->node[slot] = brick->newest = (uint32_t)++set->count, t->feedback->unfinished++;
         if (brick->state[slot] == ISOGI_TRACE__WANTED) brick->state[slot] = ISOGI_TRACE__QUEUED;
     }
+    isogi_trace__tell_around(t, index);
     return ISOGI_OK;
 }
 
