@@ -2776,8 +2776,9 @@ static int isogi_vol__filled(int n) { return n <= 8 ? 8 : (n + 15) & ~15; }
 /* Cell and place in it of points first .. first + n - 1, moved to the border if outside; isogi_vol__filled(n) are filled in. */
 static void isogi_vol__locate(const isogi_pyramid *p, const isogi_vol__points *at, size_t first, int n, isogi_vol__block *b) {
     const isogi_volume *v = &p->volume;
+    const int filled = isogi_vol__filled(n);
     int i, a;
-    for (i = 0; i < isogi_vol__filled(n); i++) {
+    for (i = 0; i < filled; i++) {
         double grid[3] = {0, 0, 0}, local;
         if (i < n) isogi_vol__grid_point(p, at, first + (size_t)i, grid);
         b->offset[i] = 0;
@@ -2803,8 +2804,9 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_avx2(const isogi_pyramid *p, const
     const double *m = p->to_grid, *o = p->origin;
     const __m256d magic = _mm256_set1_pd(6755399441055744.0); /* 1.5 * 2^52: added to a number,
                                                                  it leaves it as an integer in the low bits */
+    const int filled = isogi_vol__filled(n);
     int i, r;
-    for (i = 0; i < isogi_vol__filled(n); i += 4) {
+    for (i = 0; i < filled; i += 4) {
         __m256d k0, k1, k2, g[3], offset = _mm256_setzero_pd();
         if (at->world && i + 4 <= n) {
             const float *w = at->world[first + (size_t)i];
@@ -2846,9 +2848,10 @@ ISOGI_VOL__AVX2 static void isogi_vol__locate_floats(const isogi_pyramid *p, con
     const isogi_vol__float_grid *g = &p->float_grid;
     const __m256 zero = _mm256_setzero_ps(), one = _mm256_set1_ps(1);
     const __m128i width = _mm_cvtsi32_si128(g->shift);
+    const int filled = isogi_vol__filled(n);
     float some[24];
     int i;
-    for (i = 0; i < isogi_vol__filled(n); i += 8) {
+    for (i = 0; i < filled; i += 8) {
         const float *points = (const float *)world + 3 * (size_t)i;
         __m256 k0, k1, k2;
         __m256i voxel = _mm256_setzero_si256();
