@@ -518,7 +518,7 @@ static int parse_arguments(viewer *v, int argc, char **argv) {
             continue;
         }
         if (p->kind == FLAG) memcpy((char *)o + p->offset, &one, sizeof one);
-        else if (i + 1 >= argc || (p->kind == TEXT && !strncmp(argv[i + 1], "--", 2))) /* an option is no name of a file */
+        else if (i + 1 >= argc || !strncmp(argv[i + 1], "--", 2)) /* an option is no value */
             return file_fail(v->error, "%s: needs a value: %s", p->name, p->argument);
         else if (!parse_value(v, p, argv[++i])) return 0;
         if (p->has) memcpy((char *)o + p->has, &one, sizeof one);
@@ -1609,7 +1609,7 @@ static double expose_picture(const viewer *v, double exposure, unsigned char *by
     return sum;
 }
 
-/* A picture in which everything is black has the wrong light. */
+/* A picture in which everything is black has the wrong light; rendered matter of which nothing is seen, something else that is wrong. */
 static void note_darkness(const viewer *v) {
     size_t seen = 0;
     for (size_t i = 0; i < (size_t)v->o.width * (size_t)v->o.height; i++) {
@@ -1618,6 +1618,9 @@ static void note_darkness(const viewer *v) {
         seen += p[3] > 0;
     }
     if (seen) fprintf(stderr, "note: all that is seen is black: no light reaches it, or its colour is black\n");
+    else if (v->o.mode >= DVR && !v->o.has_surface)
+        fprintf(stderr, "note: nothing is in view: the transfer function%s all of it transparent, or the camera looks elsewhere\n",
+                v->o.clip_count ? " leaves, or --clip makes," : " leaves");
 }
 
 static int write_picture(viewer *v) {

@@ -669,6 +669,7 @@ TEST(silly_options_get_one_line_that_names_the_option) {
     static const char *const bad[][2] = {
         {"", "VOLUME"}, {"procedural:gyroid --nonsense", "--nonsense"}, {"procedural:gyroid --size", "--size"},
         {"procedural:gyroid --env --stats", "--env: needs a value"}, {"procedural:gyroid --out --raycast", "--out: needs a value"},
+        {"procedural:gyroid --iso --raycast", "--iso: needs a value"},
         {"procedural:gyroid --size 0x10", "--size"}, {"procedural:gyroid --size 10", "--size"},
         {"procedural:gyroid --size 10x10x10", "--size"},
         {"procedural:gyroid --size 1e9x1e9", "--size"}, {"procedural:gyroid --size 16384x16384", "--size"},
@@ -922,6 +923,16 @@ TEST(pictures_without_a_surface_are_told) {
         run_result r = run_viewer(command);
         CHECK(r.status == 0 && !strstr(r.error, "no surface is in view") == (k > 4) && !strstr(r.error, "lattice"), "%s: %s", words[k],
               r.error);
+    }
+}
+
+TEST(matter_that_is_not_in_view_is_told) {
+    static const char *const words[] = {"--clip 1,0,0,-1e8", "--mode scale-invariant --clip 1,0,0,-1e8", ""};
+    char command[512];
+    for (int k = 0; k < 3; k++) {
+        snprintf(command, sizeof command, "procedural:gyroid:8 --size 8x8 --mode dvr %s --out '%s'", words[k], temporary("matter.png"));
+        run_result r = run_viewer(command);
+        CHECK(r.status == 0 && !strstr(r.error, "nothing is in view") == (k == 2), "%s: %s", words[k], r.error);
     }
 }
 
